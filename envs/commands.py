@@ -1,0 +1,43 @@
+"""Velocity commands: sampling and resampling."""
+
+from dataclasses import dataclass, field
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from envs.streams import stream
+
+
+@dataclass(frozen=True)
+class CommandConfig:
+    """Ranges of the commands in V; the ranges are the paper's.
+
+    Attributes:
+        vel_x_mps, vel_y_mps, yaw_rate_rps: uniform ranges.
+        resample_s: time between commands; ours, the paper only says that it happens.
+        standing_fraction: share of commands that are zero; ours.
+    """
+
+    vel_x_mps: tuple[float, float] = field(
+        default=(0.0, 0.16), metadata={"unit": "m/s"}
+    )
+    vel_y_mps: tuple[float, float] = field(
+        default=(-0.16, 0.16), metadata={"unit": "m/s"}
+    )
+    yaw_rate_rps: tuple[float, float] = field(
+        default=(-0.45, 0.45), metadata={"unit": "rad/s"}
+    )
+    resample_s: float = field(default=5.0, metadata={"unit": "s", "low": 0.02})
+    standing_fraction: float = field(
+        default=0.05, metadata={"unit": "1", "low": 0.0, "high": 1.0}
+    )
+
+
+def sample_command(key: Array, config: CommandConfig) -> Float[Array, "3"]:
+    """Draws v_x, v_y [m/s] and the yaw rate [rad/s]."""
+    ranges = (config.vel_x_mps, config.vel_y_mps, config.yaw_rate_rps)
+    low, high = jnp.array(ranges).T
+    command = jax.random.uniform(stream(key, "command"), (3,), minval=low, maxval=high)
+    stand = jax.random.bernoulli(stream(key, "standing"), config.standing_fraction)
+    return jnp.where(stand, 0.0, command)

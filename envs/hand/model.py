@@ -1,0 +1,260 @@
+"""The MuJoCo model of the hand: primitives from the figures, sensors for the signals.
+
+Geometry is our own: one capsule per finger link (link 1 is inside the palm's reach and
+carries none), a box for the palm and one for the dorsal module. Everything that two
+hands may differ in comes from the hand file.
+"""
+
+import mujoco
+import numpy as np
+
+from envs.hand.figures import FINGERS, Link, figures
+from envs.hand.hand_file import HandFile
+
+PHYSICS_DT_S = 0.005
+FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"
+V_SITE = "control_frame"
+TIP_LINK = 4
+
+_COLOURS = {
+    "thumb": (0.80, 0.40, 0.00, 1.0),
+    "index": (0.00, 0.45, 0.70, 1.0),
+    "middle": (0.00, 0.62, 0.45, 1.0),
+    "ring": (0.80, 0.47, 0.65, 1.0),
+    "little": (0.90, 0.62, 0.00, 1.0),
+}
+_PALM_COLOUR = (0.82, 0.82, 0.84, 1.0)
+_PAYLOAD_COLOUR = (0.25, 0.27, 0.30, 1.0)
+
+
+def build_spec(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjSpec:
+    """Builds the scene: floor, hand with a free root, position drives and sensors.
+
+    Args:
+        hand: the hand file.
+        q_off: orientation of the control frame V in the palm, w x y z; identity when
+            the stance is not known yet.
+
+    Returns:
+        An uncompiled specification; `spec.to_xml()` after `compile()` gives the MJCF.
+    """
+    spec = mujoco.MjSpec()
+    spec.modelname = "wuji_right_primitive"
+    _set_options(spec)
+    _add_floor(spec, hand)
+    palm = _add_palm(spec, hand, q_off)
+    parent = palm
+    for index, link in enumerate(figures().links):
+        parent = _add_link(palm if index % 4 == 0 else parent, link, index, hand)
+        _add_drive(spec, link, index, hand)
+    _exclude_neighbours(spec)
+    _add_sensors(spec)
+    return spec
+
+
+def build_model(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjModel:
+    """Compiles `build_spec`."""
+    return build_spec(hand, q_off).compile()
+
+
+def _set_options(spec: mujoco.MjSpec) -> None:
+    spec.compiler.autolimits = False
+    spec.compiler.degree = False
+    spec.option.timestep = PHYSICS_DT_S
+    # The stiff servo (19 × nominal) needs its damping integrated implicitly.
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_PYRAMIDAL
+    spec.option.iterations = 20
+    spec.option.ls_iterations = 20
+
+
+def _add_floor(spec: mujoco.MjSpec, hand: HandFile) -> None:
+    spec.worldbody.add_light(pos=[0, 0, 2], dir=[0, 0, -1])
+    spec.worldbody.add_geom(
+        name=FLOOR,
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[0, 0, 0.05],
+        friction=[hand.link_friction.value, 0.005, 0.0001],
+        condim=3,
+        rgba=[0.92, 0.92, 0.90, 1],
+    )
+
+
+def _add_palm(
+    spec: mujoco.MjSpec, hand: HandFile, q_off: np.ndarray | None
+) -> mujoco.MjsBody:
+    palm_figures = figures().palm
+    mass = hand.palm_mass.value
+    palm = spec.worldbody.add_body(
+        name=PALM,
+        mass=mass,
+        ipos=np.add(palm_figures.inertial_pos, hand.palm_com_offset.value),
+        iquat=palm_figures.inertial_quat,
+        # The figures' inertia belongs to the vendor's lighter palm: same shape, scaled.
+        inertia=np.multiply(palm_figures.diaginertia, mass / palm_figures.mass),
+        explicitinertial=True,
+    )
+    palm.add_freejoint(name="root")
+    low, high = np.array(palm_figures.bounds_min), np.array(palm_figures.bounds_max)
+    _add_box(palm, PALM, (low + high) / 2, (high - low) / 2, _PALM_COLOUR, hand)
+    palm.add_site(
+        name=V_SITE, quat=[1, 0, 0, 0] if q_off is None else q_off, size=[0.004]
+    )
+    _add_payload(palm, hand)
+    return palm
+
+
+def _add_payload(palm: mujoco.MjsBody, hand: HandFile) -> None:
+    half = np.array(hand.payload_size.value) / 2
+    mass = hand.payload_mass.value
+    inertia = mass / 3 * (np.sum(half**2) - half**2)  # of a solid box
+    payload = palm.add_body(
+        name=PAYLOAD,
+        pos=hand.payload_pos.value,
+        # Left out, the compiler would take the frame's pose for that of the inertia.
+        ipos=[0, 0, 0],
+        iquat=[1, 0, 0, 0],
+        mass=mass,
+        inertia=inertia,
+        explicitinertial=True,
+    )
+    _add_box(payload, PAYLOAD, np.zeros(3), half, _PAYLOAD_COLOUR, hand)
+
+
+def _add_box(body, name, pos, half, rgba, hand) -> None:
+    body.add_geom(
+        name=name,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        pos=pos,
+        size=half,
+        rgba=rgba,
+        mass=0,
+        condim=3,
+        priority=1,
+        friction=[hand.link_friction.value, 0.005, 0.0001],
+    )
+
+
+def _add_link(
+    parent: mujoco.MjsBody, link: Link, index: int, hand: HandFile
+) -> mujoco.MjsBody:
+    finger, number = FINGERS[index // 4], index % 4 + 1
+    body = parent.add_body(
+        name=link.body,
+        pos=link.pos,
+        quat=link.quat,
+        mass=link.mass,
+        ipos=link.inertial_pos,
+        iquat=link.inertial_quat,
+        inertia=link.diaginertia,
+        explicitinertial=True,
+    )
+    body.add_joint(
+        name=link.joint,
+        type=mujoco.mjtJoint.mjJNT_HINGE,
+        axis=[0, 1, 0],
+        range=link.range_rad,
+        limited=True,
+        armature=link.armature,
+    )
+    if link.capsule:
+        start, end, radius = link.capsule
+        friction = hand.tip_friction if number == TIP_LINK else hand.link_friction
+        body.add_geom(
+            name=link.body,
+            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+            fromto=[*start, *end],
+            size=[radius, 0, 0],
+            mass=0,
+            condim=3,
+            priority=1,
+            friction=[friction.value, 0.005, 0.0001],
+            rgba=_COLOURS[finger],
+        )
+    if link.tip:
+        body.add_site(name=f"{finger}_tip", pos=link.tip, size=[0.002])
+    return body
+
+
+def _add_drive(spec: mujoco.MjSpec, link: Link, index: int, hand: HandFile) -> None:
+    """Adds the position servo: torque = kp (command − q) − kd q̇, clipped."""
+    kp = link.kp * hand.stiffness_scale.per_joint()[index]
+    kd = link.kv * hand.damping_scale.per_joint()[index]
+    limit = link.force_limit * hand.torque_scale.per_joint()[index]
+    spec.add_actuator(
+        name=link.joint,
+        target=link.joint,
+        trntype=mujoco.mjtTrn.mjTRN_JOINT,
+        gaintype=mujoco.mjtGain.mjGAIN_FIXED,
+        gainprm=[kp] + [0.0] * 9,
+        biastype=mujoco.mjtBias.mjBIAS_AFFINE,
+        biasprm=[0.0, -kp, -kd] + [0.0] * 7,
+        forcerange=[-limit, limit],
+        forcelimited=True,
+        ctrlrange=link.range_rad,
+        ctrllimited=True,
+    )
+
+
+def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
+    """Excludes pairs that overlap by construction: each finger's base and the palm."""
+    for finger in range(1, 6):
+        for other in (PALM, PAYLOAD):
+            spec.add_exclude(bodyname1=other, bodyname2=f"finger{finger}_link2")
+    for other in (2, 3):  # the thumb's first free link lies along the index's base
+        spec.add_exclude(bodyname1=PALM, bodyname2=f"finger1_link{other}")
+
+
+def _add_sensors(spec: mujoco.MjSpec) -> None:
+    """Adds what `envs.signals` reads; names are `<quantity>_<object>`."""
+    frame = {
+        "quat": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
+        "pos": mujoco.mjtSensor.mjSENS_FRAMEPOS,
+        "linvel": mujoco.mjtSensor.mjSENS_FRAMELINVEL,
+        "angvel": mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
+    }
+    sites = [(V_SITE, ("pos", "quat", "linvel", "angvel"))]
+    sites += [(f"{f}_tip", ("pos", "quat", "linvel")) for f in FINGERS]
+    for site, kinds in sites:
+        for kind in kinds:
+            spec.add_sensor(
+                name=f"{kind}_{site}",
+                type=frame[kind],
+                objtype=mujoco.mjtObj.mjOBJ_SITE,
+                objname=site,
+            )
+    for link in figures().links:
+        spec.add_sensor(
+            name=f"torque_{link.joint}",
+            type=mujoco.mjtSensor.mjSENS_JOINTACTFRC,
+            objtype=mujoco.mjtObj.mjOBJ_JOINT,
+            objname=link.joint,
+        )
+    for link in figures().links:
+        if link.tip:
+            _add_contact_sensor(spec, link.body, force=True)
+    for link in figures().links:
+        if link.capsule and not link.tip:
+            _add_contact_sensor(spec, link.body, force=False)
+    _add_contact_sensor(spec, PALM, force=False)
+    _add_contact_sensor(spec, PAYLOAD, force=False)
+
+
+def _add_contact_sensor(spec: mujoco.MjSpec, geom: str, force: bool) -> None:
+    """Adds the contact forces with the floor, or the number of such contacts.
+
+    A capsule meets a plane in at most two points, so two slots hold all forces; MJX
+    offers no net force, the signals add the slots (same frame: the floor's normal).
+    """
+    data = mujoco.mjtConDataField
+    field = data.mjCONDATA_FORCE if force else data.mjCONDATA_FOUND
+    mindist = 1  # MJX matches geoms only where it also sorts
+    spec.add_sensor(
+        name=f"{'force' if force else 'found'}_{geom}",
+        type=mujoco.mjtSensor.mjSENS_CONTACT,
+        objtype=mujoco.mjtObj.mjOBJ_GEOM,
+        objname=geom,
+        reftype=mujoco.mjtObj.mjOBJ_GEOM,
+        refname=FLOOR,
+        intprm=[1 << int(field), mindist, 2 if force else 1],
+    )

@@ -1,0 +1,137 @@
+"""The crawl stance: five fingertips down, settled in simulation, and what follows.
+
+The targets come from `envs.hand.stance_search`; `settle` holds them for 4 s with the
+payload, as the paper does, and records the pose, the control frame V and the nominal
+footprint. `stance.json` beside this module is the result for the default hand file.
+"""
+
+import json
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib.resources import files
+
+import mujoco
+import numpy as np
+
+from envs.errors import InputError
+from envs.hand.figures import FINGERS
+from envs.hand.hand_file import HandFile
+from envs.hand.model import PALM, PHYSICS_DT_S, build_model
+
+SETTLE_S = 4.0
+_FORWARD_LINKS = tuple(f"finger{number}_link4" for number in (2, 3, 4, 5))
+
+
+@dataclass(frozen=True)
+class Stance:
+    """A settled stance.
+
+    Attributes:
+        target_rad: joint targets that were held (20).
+        joint_pos_rad: settled joint angles (20), the reference of the observations.
+        root_pos_w: settled palm origin [m], above the world's origin.
+        root_quat_w: settled palm orientation, w x y z, V pointing along world x.
+        q_off: rotation from the palm to the control frame V, w x y z.
+        footprint_v: tip centres relative to the palm origin, in V [m] (5 × 3).
+        hand_sha256: digest of the hand file it was settled with.
+    """
+
+    target_rad: tuple[float, ...]
+    joint_pos_rad: tuple[float, ...]
+    root_pos_w: tuple[float, ...]
+    root_quat_w: tuple[float, ...]
+    q_off: tuple[float, ...]
+    footprint_v: tuple[tuple[float, ...], ...]
+    hand_sha256: str
+
+    @property
+    def qpos(self) -> np.ndarray:
+        """Settled generalized position (27)."""
+        return np.array([*self.root_pos_w, *self.root_quat_w, *self.joint_pos_rad])
+
+
+@cache
+def load_stance() -> Stance:
+    """Reads `stance.json` beside this file."""
+    raw = json.loads(files(__package__).joinpath("stance.json").read_text("utf-8"))
+    lists = {k: tuple(v) for k, v in raw.items() if isinstance(v, list)}
+    lists["footprint_v"] = tuple(tuple(tip) for tip in raw["footprint_v"])
+    return Stance(**(raw | lists))
+
+
+def stance_json(stance: Stance) -> str:
+    """The contents of `stance.json`."""
+    return json.dumps(asdict(stance), indent=1) + "\n"
+
+
+def settle(hand: HandFile, qpos: np.ndarray, target: np.ndarray) -> Stance:
+    """Holds joint targets for 4 s and records the settled stance.
+
+    Args:
+        hand: the hand file.
+        qpos: start of the settling (27), tips at the floor.
+        target: joint targets to hold [rad] (20).
+
+    Raises:
+        InputError: the hand falls, or still moves after 4 s.
+    """
+    model = build_model(hand)
+    data = mujoco.MjData(model)
+    data.qpos[:], data.ctrl[:] = qpos, target
+    for _ in range(round(SETTLE_S / PHYSICS_DT_S)):
+        mujoco.mj_step(model, data)
+    _check_settled(data)
+    mujoco.mj_forward(model, data)
+    return _describe(model, data, target, hand.sha256)
+
+
+def _check_settled(data: mujoco.MjData) -> None:
+    fastest = float(np.abs(data.qvel).max())
+    if not fastest < 1e-2 or data.qpos[2] < 0.04:
+        found = f"speed {fastest:.2g} rad/s, palm at {data.qpos[2]:.3f} m"
+        raise InputError("stance", "target_rad", found, "targets that stand still")
+
+
+def _describe(
+    model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, sha256: str
+) -> Stance:
+    """Turns the heading of a settled pose to world x and derives V and the footprint.
+
+    V is level in the settled pose; its x is the horizontal direction from the palm to
+    the centroid of the index–little distal links (paper, control frame).
+    """
+    origin = data.body(PALM).xpos.copy()
+    links = np.mean([data.body(name).xpos for name in _FORWARD_LINKS], axis=0)
+    heading = np.arctan2(*(links - origin)[[1, 0]])
+    unturn = np.array([np.cos(heading / 2), 0.0, 0.0, -np.sin(heading / 2)])
+    root = _multiply(unturn, data.qpos[3:7])
+    tips = [data.site(f"{finger}_tip").xpos - origin for finger in FINGERS]
+    return Stance(
+        target_rad=_floats(target),
+        joint_pos_rad=_floats(data.qpos[7:]),
+        root_pos_w=(0.0, 0.0, float(data.qpos[2])),
+        root_quat_w=_floats(root),
+        q_off=_floats(_conjugate(root)),
+        footprint_v=tuple(_floats(_rotate(unturn, tip)) for tip in tips),
+        hand_sha256=sha256,
+    )
+
+
+def _floats(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(round(float(value), 9) for value in values)
+
+
+def _multiply(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    out = np.zeros(4)
+    mujoco.mju_mulQuat(out, a, b)
+    return out
+
+
+def _conjugate(quat: np.ndarray) -> np.ndarray:
+    return quat * np.array([1.0, -1.0, -1.0, -1.0])
+
+
+def _rotate(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    out = np.zeros(3)
+    mujoco.mju_rotVecQuat(out, vector, quat)
+    return out

@@ -1,0 +1,55 @@
+"""What an environment carries from step to step besides physics."""
+
+import flax.struct
+from jaxtyping import Array, Float, Int
+
+from envs.hand.drive import DriveState
+from envs.observations import Sample
+from envs.randomize import Variation
+from rewards import FootprintMemory, LiftMemory, Schedule
+
+
+@flax.struct.dataclass
+class Lasting:
+    """What survives a reset: the world itself and how long it has trained.
+
+    Attributes:
+        key: the world's random key.
+        variation: the world's draw of the domain randomization.
+        footprint: nominal fingertip targets, captured once.
+        weights: reward weights; replace them to sweep rewards without recompiling.
+        total_steps: control steps of all episodes, which the curricula follow.
+        episodes: episodes begun before this one.
+    """
+
+    key: Array
+    variation: Variation
+    footprint: FootprintMemory
+    weights: dict[str, Schedule]
+    total_steps: Int[Array, "*b"]
+    episodes: Int[Array, "*b"]
+
+
+@flax.struct.dataclass
+class Memory:
+    """What an episode carries, and what survives it.
+
+    Attributes:
+        lasting: what survives a reset.
+        steps: control steps of this episode.
+        drive: delay line and filters of the actuator chain.
+        target: joint targets [rad] after the last action.
+        action: last clipped policy output.
+        history: the last eight samples of the observation.
+        command: v_x, v_y [m/s] and yaw rate [rad/s] of the coming step.
+        lift: memory of the lift objective.
+    """
+
+    lasting: Lasting
+    steps: Int[Array, "*b"]
+    drive: DriveState
+    target: Float[Array, "*b 20"]
+    action: Float[Array, "*b 20"]
+    history: Sample
+    command: Float[Array, "*b 3"]
+    lift: LiftMemory

@@ -1,0 +1,138 @@
+"""Domain randomization: what differs from world to world, and how it enters the model.
+
+A draw holds for a world through all its episodes. The ranges of friction, gains, effort
+and payload are the paper's; those of palm, IMU and noise are ours, the paper naming the
+quantity only.
+"""
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+import mujoco
+from jaxtyping import Array, Float
+
+from envs.hand.spec import HandSpec
+from envs.physics import ModelFields
+from envs.streams import stream
+
+
+@dataclass(frozen=True)
+class RandomizeConfig:
+    """Ranges of the draws; `none()` gives the nominal hand.
+
+    Attributes:
+        tip_friction: sliding friction of all fingertips.
+        gain_scale: factor on each joint's stiffness and, drawn apart, its damping.
+        effort_scale: factor on all torque limits.
+        payload_com_m: largest offset of the payload's centre of mass along the back
+            (both directions) and away from it.
+        palm_mass_scale: factor on the palm's mass and inertia (ours).
+        palm_com_m: largest offset of the palm's centre of mass, each axis (ours).
+        imu_tilt_rad: largest mounting error of the IMU about each axis (ours).
+        gyro_bias_rps: largest constant error of the gyro, each axis (ours).
+        joint_noise_rad, gravity_noise, gyro_noise_rps: largest uniform noise of each
+            sample (ours).
+    """
+
+    tip_friction: tuple[float, float] = (0.30, 1.30)
+    gain_scale: tuple[float, float] = (0.78, 1.22)
+    effort_scale: tuple[float, float] = (1.0, 1.5)
+    payload_com_m: tuple[float, float] = field(
+        default=(0.010, 0.015), metadata={"unit": "m", "low": 0.0}
+    )
+    palm_mass_scale: tuple[float, float] = (0.9, 1.1)
+    palm_com_m: float = field(default=0.005, metadata={"unit": "m", "low": 0.0})
+    imu_tilt_rad: float = field(default=0.03, metadata={"unit": "rad", "low": 0.0})
+    gyro_bias_rps: float = field(default=0.05, metadata={"unit": "rad/s", "low": 0.0})
+    joint_noise_rad: float = field(default=0.005, metadata={"unit": "rad", "low": 0.0})
+    gravity_noise: float = field(default=0.01, metadata={"unit": "1", "low": 0.0})
+    gyro_noise_rps: float = field(default=0.05, metadata={"unit": "rad/s", "low": 0.0})
+
+
+def no_randomization(tip_friction: float) -> RandomizeConfig:
+    """The nominal hand: every range is a point and every noise zero."""
+    one = (1.0, 1.0)
+    return RandomizeConfig(
+        (tip_friction, tip_friction), one, one, (0.0, 0.0), one, *([0.0] * 6)
+    )
+
+
+@flax.struct.dataclass
+class Variation:
+    """One world's draw; units as in `RandomizeConfig`."""
+
+    tip_friction: Float[Array, "*b"]
+    stiffness_scale: Float[Array, "*b 20"]
+    damping_scale: Float[Array, "*b 20"]
+    effort_scale: Float[Array, "*b"]
+    payload_com_m: Float[Array, "*b 3"]
+    palm_mass_scale: Float[Array, "*b"]
+    palm_com_m: Float[Array, "*b 3"]
+    imu_rotation_rad: Float[Array, "*b 3"]
+    gyro_bias_rps: Float[Array, "*b 3"]
+
+
+def draw_variation(key: Array, config: RandomizeConfig) -> Variation:
+    """Draws one world, each quantity from a stream of its own."""
+
+    def uniform(name: str, shape: tuple[int, ...], low: Any, high: Any) -> Array:
+        return jax.random.uniform(stream(key, name), shape, minval=low, maxval=high)
+
+    def within(name: str, bound: Any) -> Array:
+        bound = jnp.asarray(bound)
+        return uniform(name, (3,), -bound, bound)
+
+    along, away = config.payload_com_m
+    return Variation(
+        tip_friction=uniform("tip_friction", (), *config.tip_friction),
+        stiffness_scale=uniform("stiffness_scale", (20,), *config.gain_scale),
+        damping_scale=uniform("damping_scale", (20,), *config.gain_scale),
+        effort_scale=uniform("effort_scale", (), *config.effort_scale),
+        # The palm's x is normal to its back.
+        payload_com_m=within("payload_com", [away, along, along]),
+        palm_mass_scale=uniform("palm_mass", (), *config.palm_mass_scale),
+        palm_com_m=within("palm_com", config.palm_com_m),
+        imu_rotation_rad=within("imu_tilt", config.imu_tilt_rad),
+        gyro_bias_rps=within("gyro_bias", config.gyro_bias_rps),
+    )
+
+
+def model_fields(
+    model: mujoco.MjModel, spec: HandSpec, variation: Variation
+) -> ModelFields:
+    """The model fields of a varied world, all that changes and nothing else.
+
+    Subtree masses follow the palm's mass. The inverse weights that scale the softness
+    of constraints stay the nominal ones, on every backend.
+    """
+    palm, payload = spec.palm_body, spec.payload_body
+    scale = variation.palm_mass_scale
+    added = (scale - 1.0) * model.body_mass[palm]
+    gain = jnp.asarray(model.actuator_gainprm)
+    bias = jnp.asarray(model.actuator_biasprm)
+    tips = jnp.array(spec.tip_geoms)
+    return {
+        "geom_friction": jnp.asarray(model.geom_friction)
+        .at[tips, 0]
+        .set(variation.tip_friction),
+        "actuator_gainprm": gain.at[:, 0].multiply(variation.stiffness_scale),
+        "actuator_biasprm": bias.at[:, 1]
+        .multiply(variation.stiffness_scale)
+        .at[:, 2]
+        .multiply(variation.damping_scale),
+        "actuator_forcerange": jnp.asarray(model.actuator_forcerange)
+        * variation.effort_scale,
+        "body_mass": jnp.asarray(model.body_mass).at[palm].multiply(scale),
+        "body_inertia": jnp.asarray(model.body_inertia).at[palm].multiply(scale),
+        "body_ipos": jnp.asarray(model.body_ipos)
+        .at[palm]
+        .add(variation.palm_com_m)
+        .at[payload]
+        .add(variation.payload_com_m),
+        "body_subtreemass": jnp.asarray(model.body_subtreemass)
+        .at[jnp.array([0, palm])]
+        .add(added),
+    }

@@ -1,0 +1,189 @@
+"""Signals: everything that rewards, observations, terminations and measures may read.
+
+Frames: `_w` world, `_b` palm body, `_v` the stance-calibrated control frame V, which
+turns with the palm and is level in the nominal stance (x forward, z up).
+"""
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from envs.hand.figures import figures
+from envs.hand.model import PALM, PAYLOAD, V_SITE
+from envs.hand.spec import OTHER_LINKS, TIP_LINKS, TIP_SITES, HandSpec
+from envs.physics import PhysicsOutput, PhysicsState
+from envs.rotations import multiply, rotate, unrotate
+
+
+@flax.struct.dataclass
+class Signals:
+    """One hand after one control step.
+
+    Attributes:
+        joint_pos: joint angles [rad].
+        joint_vel: joint speeds [rad/s].
+        joint_acc: change of joint speed over the control step [rad/s²].
+        torque_nm: joint torques of the drive [N·m].
+        palm_pos_w: origin of the palm body [m].
+        palm_quat_w: orientation of the palm body, w x y z.
+        gravity_b: unit vector of gravity (points down) in the palm frame.
+        angvel_b: angular velocity of the palm in the palm frame [rad/s].
+        vel_v: linear velocity of the palm in V [m/s].
+        angvel_v: angular velocity of the palm in V [rad/s].
+        tip_pos_v: fingertip centres relative to the palm origin in V [m].
+        tip_vel_v: fingertip velocities relative to the rotating base in V [m/s].
+        tip_vel_w: fingertip velocities in the world [m/s].
+        tip_force_n: magnitude of the ground contact force on each fingertip [N].
+        pad_tilt_rad: elevation of each pad normal above the horizontal; +π/2 stands on
+            the nail.
+        link_contact: 1 for each non-fingertip finger link that touches the ground.
+        palm_contact: 1 if the palm or its payload touches the ground.
+        tilt_rad: roll and pitch of V against level [rad].
+        command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
+        action: clipped policy output of this step.
+        previous_action: clipped policy output of the step before.
+    """
+
+    joint_pos: Float[Array, "*b 20"]
+    joint_vel: Float[Array, "*b 20"]
+    joint_acc: Float[Array, "*b 20"]
+    torque_nm: Float[Array, "*b 20"]
+    palm_pos_w: Float[Array, "*b 3"]
+    palm_quat_w: Float[Array, "*b 4"]
+    gravity_b: Float[Array, "*b 3"]
+    angvel_b: Float[Array, "*b 3"]
+    vel_v: Float[Array, "*b 3"]
+    angvel_v: Float[Array, "*b 3"]
+    tip_pos_v: Float[Array, "*b 5 3"]
+    tip_vel_v: Float[Array, "*b 5 3"]
+    tip_vel_w: Float[Array, "*b 5 3"]
+    tip_force_n: Float[Array, "*b 5"]
+    pad_tilt_rad: Float[Array, "*b 5"]
+    link_contact: Float[Array, "*b links"]
+    palm_contact: Float[Array, "*b"]
+    tilt_rad: Float[Array, "*b 2"]
+    command: Float[Array, "*b 3"]
+    action: Float[Array, "*b 20"]
+    previous_action: Float[Array, "*b 20"]
+
+
+@flax.struct.dataclass
+class Command:
+    """What the policy was asked and what it did, as the signals repeat it.
+
+    Attributes:
+        command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
+        action: clipped policy output of this step.
+        previous_action: clipped policy output of the step before.
+    """
+
+    command: Float[Array, "*b 3"]
+    action: Float[Array, "*b 20"]
+    previous_action: Float[Array, "*b 20"]
+
+
+def extract_signals(
+    spec: HandSpec,
+    q_off: Float[Array, "4"],
+    before: PhysicsState,
+    output: PhysicsOutput,
+    asked: Command,
+    dt_s: float,
+) -> Signals:
+    """Reads all signals of one hand after a control step.
+
+    Joints and base come from the state; fingertips, torques and contacts from the
+    sensors, which every backend leaves one physics step (5 ms) behind. Tip quantities
+    are taken relative to the base at the sensors' time.
+
+    Args:
+        spec: indices of the model.
+        q_off: rotation from the palm to V, w x y z.
+        before: physics state before the control step.
+        output: result of the control step.
+        asked: command and actions.
+        dt_s: control interval [s].
+    """
+    state, sensors = output.state, output.sensordata
+    quat_w, angvel_b = state.qpos[3:7], state.qvel[3:6]
+    v_quat_w = multiply(quat_w, q_off)
+    return Signals(
+        joint_pos=state.qpos[7:],
+        joint_vel=state.qvel[6:],
+        joint_acc=(state.qvel[6:] - before.qvel[6:]) / dt_s,
+        torque_nm=_stack(spec, sensors, "torque", figures().joint_names)[:, 0],
+        palm_pos_w=state.qpos[:3],
+        palm_quat_w=quat_w,
+        gravity_b=gravity(quat_w),
+        angvel_b=angvel_b,
+        vel_v=unrotate(v_quat_w, state.qvel[:3]),
+        angvel_v=unrotate(q_off, angvel_b),
+        **_tip_signals(spec, sensors),
+        tip_force_n=_tip_force(spec, sensors),
+        link_contact=_touching(spec, sensors, OTHER_LINKS),
+        palm_contact=jnp.max(_touching(spec, sensors, (PALM, PAYLOAD))),
+        tilt_rad=tilt(v_quat_w),
+        **vars(asked),
+    )
+
+
+def gravity(quat_w: Float[Array, "4"]) -> Float[Array, "3"]:
+    """Unit vector of gravity in a frame of the given orientation."""
+    return unrotate(quat_w, jnp.array([0.0, 0.0, -1.0]))
+
+
+def tilt(v_quat_w: Float[Array, "4"]) -> Float[Array, "2"]:
+    """Roll and pitch of V against level [rad], in (−π, π] and [−π/2, π/2].
+
+    With the world's up direction u in V: roll = atan2(u_y, u_z), pitch = asin(−u_x).
+    """
+    up = -gravity(v_quat_w)
+    return jnp.stack([jnp.arctan2(up[1], up[2]), _arcsin(-up[0])])
+
+
+def _tip_signals(spec: HandSpec, sensors: Float[Array, " n"]) -> dict[str, Array]:
+    """Positions, velocities and pad tilts of the five tips."""
+    base_pos, base_quat, base_vel, base_angvel = (
+        spec.read(sensors, f"{kind}_{V_SITE}")
+        for kind in ("pos", "quat", "linvel", "angvel")
+    )
+    pos_w = _stack(spec, sensors, "pos", TIP_SITES)
+    vel_w = _stack(spec, sensors, "linvel", TIP_SITES)
+    offset_w = pos_w - base_pos
+    relative_w = vel_w - base_vel - jnp.cross(base_angvel, offset_w)
+    to_v = jax.vmap(lambda x: unrotate(base_quat, x))
+    pad_w = jax.vmap(lambda quat: rotate(quat, jnp.array([1.0, 0.0, 0.0])))(
+        _stack(spec, sensors, "quat", TIP_SITES)
+    )
+    return {
+        "tip_pos_v": to_v(offset_w),
+        "tip_vel_v": to_v(relative_w),
+        "tip_vel_w": vel_w,
+        "pad_tilt_rad": _arcsin(pad_w[:, 2]),
+    }
+
+
+def _tip_force(spec: HandSpec, sensors: Float[Array, " n"]) -> Float[Array, "5"]:
+    """Magnitude of the net floor force on each tip [N], over both contact slots."""
+    slots = _stack(spec, sensors, "force", TIP_LINKS).reshape(5, 2, 3)
+    return jnp.sqrt(jnp.sum(jnp.sum(slots, axis=1) ** 2, axis=-1))
+
+
+def _touching(
+    spec: HandSpec, sensors: Float[Array, " n"], geoms: tuple[str, ...]
+) -> Float[Array, " m"]:
+    """1 for each geom that touches the floor."""
+    found = _stack(spec, sensors, "found", geoms)[:, 0]
+    return (found > 0).astype(sensors.dtype)
+
+
+def _stack(
+    spec: HandSpec, sensors: Float[Array, " n"], kind: str, names: tuple[str, ...]
+) -> Float[Array, "names m"]:
+    return jnp.stack([spec.read(sensors, f"{kind}_{name}") for name in names])
+
+
+def _arcsin(x: Float[Array, "*b"]) -> Float[Array, "*b"]:
+    """Arc sine of a component of a unit vector, which rounding may put beyond 1."""
+    return jnp.arcsin(jnp.clip(x, -1.0, 1.0))

@@ -1,0 +1,209 @@
+"""Checkpoints: the whole training state, committed at once, checked when read.
+
+A checkpoint is a directory named after its iteration: arrays in Orbax format,
+`meta.json` and a manifest with the SHA-256 of every file. It is written under a
+temporary name and renamed when it is complete and on the disk, so that a process killed
+at any moment leaves the checkpoints before it as they were.
+"""
+
+import json
+import shutil
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import orbax.checkpoint as ocp
+
+from envs.errors import InputError
+from fingers_mjx import checkpoint_manifest as manifest
+from fingers_mjx.checkpoint_tree import (
+    check_layout,
+    describe,
+    from_host,
+    leaf_names,
+    to_host,
+)
+from fingers_mjx.rundir_files import room_for
+from fingers_mjx.train_errors import OutOfSpace
+
+_TMP, _OLD = ".tmp-", ".old-"
+_MARGIN_BYTES = 1 << 20
+
+
+@dataclass(frozen=True)
+class Saved:
+    """A checkpoint that was read: its arrays by name and what was noted beside them."""
+
+    path: Path
+    arrays: Mapping[str, np.ndarray]
+    meta: Mapping[str, Any]
+
+    @property
+    def iteration(self) -> int:
+        """Iterations that were done when it was saved."""
+        return self.meta["iteration"]
+
+    def into(self, template: Any) -> Any:
+        """Returns the saved leaves in the structure of `template`, on the device.
+
+        Raises:
+            InputError: if the leaves do not fit, naming the first.
+        """
+        check_layout(self.path, self.meta["leaves"], template)
+        return from_host(template, self.arrays)
+
+    def part(self, template: Any) -> Any:
+        """Returns those of the saved leaves that `template` has, in its structure.
+
+        Raises:
+            InputError: if one of them is missing or of another shape.
+        """
+        wanted = set(leaf_names(template))
+        saved = {k: v for k, v in self.meta["leaves"].items() if k in wanted}
+        check_layout(self.path, saved, template)
+        return from_host(template, self.arrays)
+
+
+def save(
+    directory: Path,
+    iteration: int,
+    state: Any,
+    meta: Mapping[str, Any],
+    keep: int,
+    reached: Callable[[str], None] = lambda point: None,
+) -> Path:
+    """Writes a checkpoint and returns its path; then deletes all but the `keep` newest.
+
+    Args:
+        directory: of all checkpoints of the run.
+        iteration: iterations done.
+        state: pytree of arrays; typed random keys are kept as such.
+        meta: JSON-able notes (configuration, versions).
+        keep: number of checkpoints kept.
+        reached: told each named point of the protocol (for tests of sudden death).
+
+    Raises:
+        OutOfSpace: if the disk is full; earlier checkpoints are intact.
+    """
+    reached("begin")
+    arrays, final = to_host(state), directory / f"{iteration:08d}"
+    needed = sum(a.nbytes for a in arrays.values()) + _MARGIN_BYTES
+    notes = {**meta, "iteration": iteration, "leaves": describe(state)}
+    tmp = directory / f"{_TMP}{iteration:08d}"
+    try:
+        with room_for(final, needed):
+            _write(tmp, arrays, notes, iteration, reached)
+            _commit(tmp, final, reached)
+    except OutOfSpace:
+        shutil.rmtree(tmp, ignore_errors=True)
+        raise
+    _retire(directory, keep, reached)
+    return final
+
+
+def clean(directory: Path) -> None:
+    """Removes what a killed process left behind half written or half deleted."""
+    for path in directory.glob(".*"):
+        if path.name.startswith((_TMP, _OLD)):
+            shutil.rmtree(path)
+
+
+def checkpoints(directory: Path) -> list[Path]:
+    """Returns the checkpoints in `directory`, oldest first."""
+    return sorted(p for p in directory.glob("[0-9]" * 8) if p.is_dir())
+
+
+def newest(directory: Path, say: Callable[[str], None]) -> Path | None:
+    """Returns the newest checkpoint that is intact; None if none was ever written.
+
+    Args:
+        directory: of all checkpoints of the run.
+        say: told one sentence for each checkpoint that is passed over.
+
+    Raises:
+        InputError: if there are checkpoints, but none is intact.
+    """
+    found = checkpoints(directory)
+    for path in reversed(found):
+        fault = manifest.problem(path, int(path.name))
+        if not fault:
+            return path
+        say(f"checkpoint {path} is damaged ({fault}); trying the one before it")
+    if found:
+        raise InputError(directory, "", "only damaged checkpoints", "an intact one")
+    return None
+
+
+def set_aside(directory: Path, after: int) -> None:
+    """Renames the (damaged) checkpoints later than iteration `after` to "damaged-…"."""
+    for path in checkpoints(directory):
+        if int(path.name) > after:
+            target = path.with_name(f"damaged-{path.name}")
+            shutil.rmtree(target, ignore_errors=True)
+            path.rename(target)
+
+
+def load(path: Path) -> Saved:
+    """Reads the checkpoint at `path`, every byte of it checked.
+
+    Raises:
+        InputError: if it is missing, incomplete or altered.
+    """
+    if not (path.name.isdigit() and path.is_dir()):
+        found = "another name or no directory"
+        raise InputError(path, "", found, "a checkpoint, checkpoints/NNNNNNNN")
+    fault = manifest.problem(path, int(path.name))
+    if fault:
+        raise InputError(path, "", fault, "a complete checkpoint")
+    meta = json.loads((path / "meta.json").read_text(encoding="utf-8"))
+    with ocp.PyTreeCheckpointer() as reader:
+        stored = reader.restore((path / "state").absolute())
+    empty = {name: np.zeros(shape) for name, shape in meta["empty"].items()}
+    return Saved(path, {**stored, **empty}, meta)
+
+
+def _write(
+    tmp: Path,
+    arrays: Mapping[str, np.ndarray],
+    notes: dict[str, Any],
+    iteration: int,
+    reached: Callable[[str], None],
+) -> None:
+    """Writes everything of a checkpoint under its temporary name."""
+    shutil.rmtree(tmp, ignore_errors=True)
+    tmp.mkdir(parents=True)
+    reached("made")
+    stored = {name: array for name, array in arrays.items() if array.size}
+    notes["empty"] = {k: a.shape for k, a in arrays.items() if not a.size}
+    with ocp.PyTreeCheckpointer() as writer:
+        writer.save((tmp / "state").absolute(), stored)
+    reached("state written")
+    text = json.dumps(notes, indent=1) + "\n"
+    (tmp / "meta.json").write_text(text, encoding="utf-8")
+    reached("meta written")
+    manifest.seal(tmp, iteration)
+    reached("sealed")
+
+
+def _commit(tmp: Path, final: Path, reached: Callable[[str], None]) -> None:
+    """Gives the complete checkpoint its name, in place of an older one of that name."""
+    if final.exists():
+        final.rename(final.with_name(f"{_OLD}{final.name}"))
+    reached("name free")
+    tmp.rename(final)
+    reached("renamed")
+    manifest.sync(final.parent)
+    reached("committed")
+
+
+def _retire(directory: Path, keep: int, reached: Callable[[str], None]) -> None:
+    """Deletes all but the newest `keep` checkpoints, each hidden before it goes."""
+    for path in checkpoints(directory)[:-keep]:
+        hidden = path.with_name(f"{_OLD}{path.name}")
+        path.rename(hidden)
+        reached("hidden")
+    for hidden in directory.glob(f"{_OLD}*"):
+        shutil.rmtree(hidden)
+        reached("deleted")

@@ -1,0 +1,139 @@
+"""Evaluation: many randomized episodes of one policy, measured one by one."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from typing import Protocol
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.base import State
+from envs.errors import InputError
+from fingers_mjx.evaluate_record import MASS_KG, Trace, episode_measures, record
+
+REPORT_EVERY = 50
+Policy = Callable[[dict[str, Array]], Float[Array, "B actions"]]
+Progress = Callable[[int, int], None]
+
+
+class BatchEnv(Protocol):
+    """What evaluation needs of a batched environment."""
+
+    @property
+    def dt(self) -> float:
+        """Control interval [s]."""
+        ...
+
+    def reset(self, key: Array) -> State:
+        """Starts an episode in every world."""
+        ...
+
+    def step(self, state: State, action: Float[Array, "B actions"]) -> State:
+        """Advances every world by one control interval."""
+        ...
+
+
+@dataclass(frozen=True)
+class EpisodeTable:
+    """Measures and traces of an evaluation.
+
+    Attributes:
+        columns: name of a measure to one value per episode; NaN means undefined.
+        traces: NumPy arrays, axes time and episode first.
+        dt_s: control interval.
+    """
+
+    columns: dict[str, np.ndarray]
+    traces: Trace
+    dt_s: float
+
+    def episode(self, index: int) -> Trace:
+        """Returns the steps of one episode that count, time first."""
+        one = jax.tree.map(lambda x: x[:, index], self.traces)
+        length = int(np.cumprod(~one.done).sum())
+        return jax.tree.map(lambda x: x[:length], one)
+
+
+def evaluate(
+    batch_env: BatchEnv,
+    policy_apply: Policy,
+    episodes: int,
+    steps: int,
+    key: Array,
+    mass_kg: float = MASS_KG,
+    progress: Progress | None = None,
+) -> EpisodeTable:
+    """Runs a policy and measures each episode up to its first `done`.
+
+    Batches are run until there are `episodes`; what a world does after its first `done`
+    is ignored, so it does not matter whether the environment resets itself. An episode
+    that is still running after `steps` counts as survived.
+
+    Args:
+        batch_env: the environment; the batch is as large as its `reset` makes it.
+        policy_apply: from batched observations to batched actions, deterministic.
+        episodes: number of episodes.
+        steps: longest episode in control steps.
+        key: of the resets; the same key gives the same episodes.
+        mass_kg: of the hand and what it carries, for the cost of transport.
+        progress: called with (steps done, steps in all) from time to time.
+
+    Raises:
+        InputError: `episodes` or `steps` is below one.
+    """
+    for name, value in (("episodes", episodes), ("steps", steps)):
+        if value < 1:
+            raise InputError("evaluate", name, value, "an integer above 0")
+    advance = jax.jit(partial(_advance, batch_env, policy_apply))
+    rollouts, reset = [], jax.jit(batch_env.reset)
+    while (count := sum(r.done.shape[1] for r in rollouts)) < episodes:
+        state = reset(jax.random.fold_in(key, len(rollouts)))
+        batches = -(-episodes // len(state.done))
+        tell = _telling(progress, count // len(state.done) * steps, batches * steps)
+        rollouts.append(_rollout(advance, state, steps, tell))
+    traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :episodes], *rollouts)
+    return EpisodeTable(
+        _columns(traces, batch_env.dt, mass_kg), traces, float(batch_env.dt)
+    )
+
+
+def _advance(env: BatchEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:
+    after = env.step(state, policy_apply(state.obs))
+    return after, record(after)
+
+
+def _rollout(
+    advance: Callable[[State], tuple[State, Trace]],
+    state: State,
+    steps: int,
+    tell: Callable[[int], None],
+) -> Trace:
+    taken = []
+    for index in range(steps):
+        state, now = advance(state)
+        taken.append(now)
+        if (index + 1) % REPORT_EVERY == 0:
+            jax.block_until_ready(now)
+            tell(index + 1)
+    return jax.tree.map(lambda *x: np.stack(x), *jax.device_get(taken))
+
+
+def _telling(progress: Progress | None, before: int, total: int):
+    def tell(done: int) -> None:
+        if progress is not None:
+            progress(before + done, total)
+
+    return tell
+
+
+def _columns(traces: Trace, dt_s: float, mass_kg: float) -> dict[str, np.ndarray]:
+    found = _measures(traces, float(dt_s), float(mass_kg))
+    return {name: np.asarray(values, float) for name, values in found.items()}
+
+
+@partial(jax.jit, static_argnames=("dt_s", "mass_kg"))
+def _measures(traces: Trace, dt_s: float, mass_kg: float) -> dict[str, Array]:
+    measure = partial(episode_measures, dt_s=dt_s, mass_kg=mass_kg)
+    return jax.vmap(measure, in_axes=1)(traces)

@@ -1,0 +1,109 @@
+"""Files of an evaluation: per-episode Parquet table and JSON summary, each atomic."""
+
+import json
+import os
+import tempfile
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from envs.errors import InputError
+from fingers_mjx.stats import Summary, summarize
+
+
+def write_atomic(path: Path, content: bytes) -> Path:
+    """Writes a whole file or leaves the old one: temporary file, sync, rename."""
+    handle, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+    try:
+        with os.fdopen(handle, "wb") as stream:
+            stream.write(content)
+            stream.flush()
+            os.fsync(stream.fileno())
+        Path(partial).chmod(0o644)
+        Path(partial).replace(path)
+    finally:
+        Path(partial).unlink(missing_ok=True)
+    return path
+
+
+def write_table(
+    path: Path,
+    columns: Mapping[str, np.ndarray],
+    about: Mapping[str, str] | None = None,
+) -> Path:
+    """Writes one row per episode as Parquet.
+
+    Args:
+        path: file to write.
+        columns: measure name to one value per episode; NaN means undefined.
+        about: text stored beside the columns (task, policy, seed, ...).
+    """
+    rows = {"episode": np.arange(len(next(iter(columns.values())))), **columns}
+    table = pa.table({name: pa.array(values) for name, values in rows.items()})
+    table = table.replace_schema_metadata(dict(about or {}))
+    memory = pa.BufferOutputStream()
+    pq.write_table(table, memory, compression="zstd")
+    return write_atomic(path, memory.getvalue().to_pybytes())
+
+
+def read_table(path: Path) -> dict[str, np.ndarray]:
+    """Returns the columns of a table that `write_table` wrote.
+
+    Raises:
+        InputError: the file is missing or is not a Parquet file.
+    """
+    try:
+        table = pq.read_table(path)
+    except (OSError, pa.ArrowInvalid) as error:
+        raise InputError(path, "", error, "a Parquet table of episodes") from error
+    return {name: table[name].to_numpy() for name in table.column_names}
+
+
+def summary_document(
+    columns: Mapping[str, np.ndarray],
+    task: str,
+    policy: str,
+    seed: int,
+    steps_trained: int,
+    commit: str | None = None,
+) -> dict[str, object]:
+    """Returns the summary of an evaluation as plain values for JSON.
+
+    Keys: task, policy, episodes, seed, steps_trained, commit (if known) and measures,
+    which maps each name to mean, std, n, low and high (95 % interval). An undefined
+    number, such as the mean of no episodes, is None.
+
+    Args:
+        columns: measure name to one value per episode.
+        task: name of the task.
+        policy: name or path of the policy.
+        seed: seed of the evaluation.
+        steps_trained: environment steps behind the policy.
+        commit: version of the code.
+    """
+    known = {} if commit is None else {"commit": commit}
+    measures = {name: _plain(summarize(v, seed=seed)) for name, v in columns.items()}
+    return {
+        "task": task,
+        "policy": policy,
+        "episodes": len(next(iter(columns.values()))),
+        "seed": seed,
+        "steps_trained": steps_trained,
+        **known,
+        "measures": measures,
+    }
+
+
+def write_summary(path: Path, document: Mapping[str, object]) -> Path:
+    """Writes the summary as JSON, without the non-standard NaN and Infinity."""
+    text = json.dumps(document, indent=2, allow_nan=False) + "\n"
+    return write_atomic(path, text.encode())
+
+
+def _plain(summary: Summary) -> dict[str, float | int | None]:
+    values = asdict(summary)
+    return {k: v if np.isfinite(v) else None for k, v in values.items()}

@@ -1,0 +1,244 @@
+"""The paper's measures of one episode, as pure functions of its time series.
+
+Every function takes the arrays of one episode over control steps t and a mask `alive`
+(1 up to the last step that counts, then 0); callers vmap over episodes. Averages run
+over the steps that count. A measure that an episode does not define, such as the speed
+of an episode without a speed command, is NaN. Where the paper ("Measures" in its
+ablation) leaves a choice open, the docstring says "ours".
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+CONTACT_N = 0.15
+DEADBAND_MPS = 0.02
+NAIL_TILT_RAD = jnp.deg2rad(64.0).item()
+MIN_TOUCHDOWNS = 3
+MIN_CONTACT_FRACTION = 0.05
+
+
+def masked_mean(
+    values: Float[Array, "T ..."], mask: Bool[Array, "T ..."]
+) -> Float[Array, "..."]:
+    """Returns Σ_t m_t x_t / Σ_t m_t; NaN where the mask is empty.
+
+    Values outside the mask may be anything, NaN included.
+    """
+    total = jnp.where(mask, values, 0.0).sum(axis=0)
+    count = mask.sum(axis=0)
+    return jnp.where(count > 0, total / jnp.maximum(count, 1), jnp.nan)
+
+
+def task_speed_mps(
+    vel_v: Float[Array, "T 2"], command: Float[Array, "T 3"], alive: Bool[Array, " T"]
+) -> Float[Array, ""]:
+    """Progress in the commanded direction [m/s].
+
+    mean over {t : ‖c_t‖ ≥ 0.02 m/s} of v_t · c_t / ‖c_t‖, with v the palm's planar
+    velocity and c the planar command, both in V. Negative for motion the wrong way.
+    Leaving out the steps of smaller commands, which have no direction, is ours; their
+    threshold is the paper's dead band of the lift and direction objectives.
+
+    Source: paper, Measures, "task speed".
+    """
+    planar = command[:, :2]
+    speed = jnp.linalg.norm(planar, axis=1)
+    direction = planar / jnp.maximum(speed, DEADBAND_MPS)[:, None]
+    progress = jnp.sum(vel_v * direction, axis=1)
+    return masked_mean(progress, alive & (speed >= DEADBAND_MPS))
+
+
+def contacts(
+    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
+) -> Bool[Array, "T 5"]:
+    """Tells which fingertips carry at least 0.15 N in which steps that count.
+
+    Source: paper, contact threshold F_th.
+    """
+    return (tip_force_n >= CONTACT_N) & alive[:, None]
+
+
+def touchdowns(
+    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
+) -> Float[Array, "5"]:
+    """Number of rising edges of each tip's contact.
+
+    A tip that stands at the start has not touched down yet (ours).
+    """
+    contact = contacts(tip_force_n, alive)
+    return (contact[1:] & ~contact[:-1]).sum(axis=0).astype(jnp.float32)
+
+
+def contact_fraction(
+    contact: Bool[Array, "T 5"], alive: Bool[Array, " T"]
+) -> Float[Array, "5"]:
+    """Fraction of the episode that each tip is in contact: Σ contact / Σ alive."""
+    counted = jnp.broadcast_to(alive[:, None], contact.shape)
+    return masked_mean(contact.astype(jnp.float32), counted)
+
+
+def five_finger_participation(
+    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
+) -> Float[Array, ""]:
+    """1 if every fingertip takes part in the gait, else 0.
+
+    Taking part: at least 3 touchdowns and at least 5 % of the episode in contact. The
+    mean over episodes is the fraction that the paper reports.
+
+    Source: paper, Measures, "five-finger participation".
+    """
+    contact = contacts(tip_force_n, alive)
+    return _participation(tip_force_n, contact, alive)
+
+
+def non_nail_participation(
+    tip_force_n: Float[Array, "T 5"],
+    pad_tilt_rad: Float[Array, "T 5"],
+    alive: Bool[Array, " T"],
+) -> Float[Array, ""]:
+    """1 if every fingertip takes part in the gait without counting its nail, else 0.
+
+    As `five_finger_participation`, but only contact with a tilt below 64° counts
+    towards the 5 % of the episode; all touchdowns count.
+
+    Source: paper, Measures, "non-nail participation".
+    """
+    contact = contacts(tip_force_n, alive)
+    padded = contact & (pad_tilt_rad < NAIL_TILT_RAD)
+    return _participation(tip_force_n, padded, alive)
+
+
+def contact_tilt_rad(
+    tip_force_n: Float[Array, "T 5"],
+    pad_tilt_rad: Float[Array, "T 5"],
+    alive: Bool[Array, " T"],
+) -> Float[Array, "5"]:
+    """Mean tilt of each fingertip while in contact [rad], NaN for a tip never down.
+
+    The tilt is the elevation of the pad's normal above the horizontal: -π/2 lies flat
+    on the pad, +π/2 stands on the nail. `nanmean` and `nanmax` over tips give the mean
+    and the worst tip.
+
+    Source: paper, Measures, contact posture.
+    """
+    return masked_mean(pad_tilt_rad, contacts(tip_force_n, alive))
+
+
+def worst_tip_planting_fraction(
+    tip_force_n: Float[Array, "T 5"],
+    pad_tilt_rad: Float[Array, "T 5"],
+    alive: Bool[Array, " T"],
+) -> Float[Array, ""]:
+    """Smallest over tips of the fraction of contact time below 64° of tilt, in [0, 1].
+
+    The tip with the largest fraction of nail-side contact has the smallest fraction of
+    the other side. Tips never in contact are left out (ours); NaN if none is.
+
+    Source: paper, Measures, "worst-tip planting fraction".
+    """
+    below = (pad_tilt_rad < NAIL_TILT_RAD).astype(jnp.float32)
+    return jnp.nanmin(masked_mean(below, contacts(tip_force_n, alive)))
+
+
+def undesired_contact_rate(
+    undesired: Bool[Array, " T"], alive: Bool[Array, " T"]
+) -> Float[Array, ""]:
+    """Fraction of steps in which the palm or a link that is no fingertip touches.
+
+    In [0, 1]; ours.
+    """
+    return masked_mean(undesired.astype(jnp.float32), alive)
+
+
+def energy_j(
+    power_w: Float[Array, " T"], alive: Bool[Array, " T"], dt_s: float
+) -> Float[Array, ""]:
+    """Mechanical work of the joints without recuperation [J]: Σ_t P_t Δt.
+
+    P = Σ_i |τ_i ω_i| with torque τ and speed ω of joint i, sampled once per control
+    step. Heat of the motors is not included; ours.
+    """
+    return jnp.where(alive, power_w, 0.0).sum() * dt_s
+
+
+def path_speed_mps(
+    palm_pos_w: Float[Array, "T 3"],
+    alive: Bool[Array, " T"],
+    dt_s: float,
+    window_s: float = 1.0,
+) -> Float[Array, ""]:
+    """Speed along the palm's path over the floor [m/s].
+
+    mean_t ‖p_{t+w} - p_t‖ / w with the horizontal position p: displacement over a
+    sliding window of one second, so that swaying within a stride does not count as
+    travel (ours; at the largest turn rate of 0.45 rad/s a chord is 0.8 % shorter than
+    its arc). NaN for an episode shorter than the window.
+
+    Source: paper, hardware "mean path speed".
+    """
+    lag = min(max(1, round(window_s / dt_s)), len(palm_pos_w) - 1)
+    short = alive.sum() * dt_s <= window_s - dt_s / 2
+    step = palm_pos_w[lag:, :2] - palm_pos_w[:-lag, :2]
+    speed = jnp.linalg.norm(step, axis=1) / (lag * dt_s)
+    return jnp.where(short, jnp.nan, masked_mean(speed, alive[lag:]))
+
+
+def cost_of_transport(
+    energy: Float[Array, ""],
+    path_speed: Float[Array, ""],
+    duration_s: Float[Array, ""],
+    mass_kg: float,
+    gravity_mps2: float = 9.81,
+) -> Float[Array, ""]:
+    """Energy over weight and distance: E / (m g · v · T), without unit; NaN at rest."""
+    distance = path_speed * duration_s
+    return jnp.where(
+        distance > 0, energy / (mass_kg * gravity_mps2 * distance), jnp.nan
+    )
+
+
+def turn_rate_error_rad_s(
+    yaw_rate: Float[Array, " T"],
+    command_yaw_rate: Float[Array, " T"],
+    alive: Bool[Array, " T"],
+    dt_s: float,
+    window_s: float = 1.0,
+) -> Float[Array, ""]:
+    """How far the heading rate is from its command [rad/s], at least 0.
+
+    mean_t |(1/w) Σ_{s in t..t+w} (ω_s - c_s)|: the error of sliding one-second means,
+    because the yaw rate swings within each stride (ours). NaN for an episode shorter
+    than the window.
+    """
+    span = max(1, round(window_s / dt_s))
+    error = jnp.where(alive, yaw_rate - command_yaw_rate, 0.0)
+    if span > len(error):
+        return jnp.array(jnp.nan, error.dtype)
+    kernel = jnp.full(span, 1.0 / span, error.dtype)
+    means = jnp.convolve(error, kernel, mode="valid")
+    return masked_mean(jnp.abs(means), alive[span - 1 :])
+
+
+def survival(failed: Bool[Array, " T"]) -> Float[Array, ""]:
+    """1 if no step before the time limit ended the episode by failure, else 0.
+
+    Source: paper, terminations.
+    """
+    return 1.0 - failed.any().astype(jnp.float32)
+
+
+def steps_alive(done: Bool[Array, " T"]) -> Bool[Array, " T"]:
+    """Tells which steps come before the first `done`.
+
+    The step of `done` itself does not count: an environment that resets itself has
+    already replaced its signals by those of the next episode.
+    """
+    return jnp.cumsum(done.astype(jnp.int32)) == 0
+
+
+def _participation(
+    tip_force_n: Array, counted: Array, alive: Array
+) -> Float[Array, ""]:
+    steps = touchdowns(tip_force_n, alive) >= MIN_TOUCHDOWNS
+    share = contact_fraction(counted, alive) >= MIN_CONTACT_FRACTION
+    return jnp.all(steps & share).astype(jnp.float32)

@@ -1,0 +1,140 @@
+"""The one module that imports Brax: its PPO networks, loss, rate and normalizer.
+
+Brax's own `ppo.train` is one function that cannot save or restore the whole training
+state, so the iteration (`fingers_mjx.ppo`) is built here from Brax's parts instead.
+"""
+
+import functools
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import optax
+from brax.training.acme import running_statistics
+from brax.training.acme.running_statistics import RunningStatisticsState
+from brax.training.agents.ppo import losses, networks, optimizer
+from brax.training.agents.ppo.losses import PPONetworkParams
+from brax.training.agents.ppo.networks import PPONetworks
+from brax.training.types import Transition
+from flax import linen
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
+
+from fingers_mjx.ppo_config import PpoConfig
+
+__all__ = [
+    "PPONetworkParams",
+    "PPONetworks",
+    "RunningStatisticsState",
+    "Transition",
+    "adapt_learning_rate",
+    "brax_loss",
+    "init_normalizer",
+    "learning_rate",
+    "make_networks",
+    "make_optimizer",
+    "sample_action",
+    "update_normalizer",
+]
+
+
+def make_networks(
+    observation_size: Mapping[str, int], action_size: int, config: PpoConfig
+) -> PPONetworks:
+    """Returns actor (on "state") and critic (on "privileged_state"), ELU, with noise.
+
+    The action distribution is a plain normal whose standard deviation does not depend
+    on the observation: the environment clips and squashes.
+    """
+    return networks.make_ppo_networks(
+        dict(observation_size),
+        action_size,
+        preprocess_observations_fn=running_statistics.normalize,  # pyright: ignore
+        policy_hidden_layer_sizes=config.actor_layers,
+        value_hidden_layer_sizes=config.critic_layers,
+        activation=linen.elu,
+        policy_obs_key="state",
+        value_obs_key="privileged_state",
+        distribution_type="normal",
+        noise_std_type=config.noise_std_type,  # pyright: ignore[reportArgumentType]
+        init_noise_std=config.init_noise_std,
+    )
+
+
+def make_optimizer(config: PpoConfig) -> optax.GradientTransformation:
+    """Returns Adam with a rate kept in its state, after clipping the global norm."""
+    adam = optax.inject_hyperparams(optax.adam)(learning_rate=config.learning_rate)
+    return optax.chain(optax.clip_by_global_norm(config.max_grad_norm), adam)
+
+
+def adapt_learning_rate(
+    state: optax.OptState, kl: Float[Array, ""], config: PpoConfig
+) -> optax.OptState:
+    """Returns `state` with the rate divided or multiplied by 1.5 as the KL asks.
+
+    Above 2·desired_kl the rate falls, below desired_kl/2 it rises, within its bounds.
+    """
+    own = jax.tree.map(lambda x: x, state)  # Brax writes into the dict it is given
+    adapted, _ = optimizer.adaptive_kl_learning_rate(
+        own,  # pyright: ignore[reportArgumentType]
+        kl,
+        config.desired_kl,
+        config.learning_rate_min,
+        config.learning_rate_max,
+    )
+    return adapted
+
+
+def learning_rate(state: optax.OptState) -> Float[Array, ""]:
+    """Returns the current rate of an optimizer made by `make_optimizer`."""
+    return state[-1].hyperparams["learning_rate"]  # pyright: ignore
+
+
+def brax_loss(ppo_networks: PPONetworks, config: PpoConfig) -> Any:
+    """Returns Brax's PPO loss (params, normalizer, data, key) -> (loss, terms).
+
+    `data` is a Transition of [worlds, time, ...]; of `next_observation` only the last
+    time is read, so it may have length one. Truncated steps do not contribute.
+    """
+    return functools.partial(
+        losses.compute_ppo_loss,
+        ppo_network=ppo_networks,
+        entropy_cost=config.entropy_cost,
+        discounting=config.discount,
+        reward_scaling=config.reward_scale,
+        gae_lambda=config.gae_lambda,
+        clipping_epsilon=config.clip,
+        normalize_advantage=True,
+        vf_coefficient=config.value_cost,
+    )
+
+
+def init_normalizer(observation_size: Mapping[str, int]) -> RunningStatisticsState:
+    """Returns running mean and deviation of each observation, before any data."""
+    shapes = {k: jnp.zeros(n) for k, n in observation_size.items()}
+    return running_statistics.init_state(shapes)
+
+
+def update_normalizer(
+    state: RunningStatisticsState,
+    observation: Mapping[str, Float[Array, "t b _"]],
+    valid: Bool[Array, "t b"],
+) -> RunningStatisticsState:
+    """Returns `state` after the rows of `observation` that are `valid`.
+
+    If nothing was valid, or the new statistics would not be finite, the old are kept.
+    """
+    weights = valid.astype(jnp.float32)
+    new = running_statistics.update(state, dict(observation), weights=weights)
+    finite = [jnp.all(jnp.isfinite(x)) for x in jax.tree.leaves(new)]
+    ok = jnp.all(jnp.stack(finite)) & jnp.any(valid)
+    return jax.tree.map(lambda n, o: jnp.where(ok, n, o), new, state)
+
+
+def sample_action(
+    ppo_networks: PPONetworks, logits: Any, key: PRNGKeyArray
+) -> tuple[Float[Array, "b a"], Float[Array, " b"]]:
+    """Returns an action of the distribution `logits` and its log-probability."""
+    distribution = ppo_networks.parametric_action_distribution
+    action = distribution.sample_no_postprocessing(logits, key)
+    return action, distribution.log_prob(logits, action)

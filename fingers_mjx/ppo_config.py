@@ -1,0 +1,146 @@
+"""Settings of a training run: frozen, documented, typed; three presets."""
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from envs.config import to_dict
+from envs.errors import InputError, one_of
+
+POSITIVE = 1e-9
+"""Lower bound of numbers that must be above zero."""
+
+
+def _number(default: Any, low: Any, high: Any = None, **notes: Any) -> Any:
+    """Returns a field with a range; `free=True` if a resumed run may change it."""
+    limits = {"low": low} if high is None else {"low": low, "high": high}
+    return dataclasses.field(default=default, metadata=limits | notes)
+
+
+@dataclass(frozen=True)
+class PpoConfig:
+    """Proximal policy optimization (defaults: the paper's values).
+
+    Attributes:
+        unroll_length: control steps per world and iteration.
+        epochs: passes over the data of one iteration.
+        minibatches: parts into which the worlds are split in each pass.
+        clip: ε of the clipped surrogate objective.
+        discount: γ per control step.
+        gae_lambda: λ of the generalized advantage estimate.
+        entropy_cost: weight of the entropy bonus.
+        value_cost: weight of the value loss, which is half the mean squared error
+            (ours: the paper is silent).
+        learning_rate: rate of Adam at the start.
+        learning_rate_min: lower bound of the adaptive rate (ours).
+        learning_rate_max: upper bound of the adaptive rate (ours).
+        desired_kl: divergence per update that the adaptive rate aims at.
+        max_grad_norm: global norm to which gradients are clipped (ours).
+        actor_layers: hidden sizes of the policy.
+        critic_layers: hidden sizes of the value function.
+        init_noise_std: standard deviation of the action noise at the start (ours).
+        noise_std_type: "log" learns log σ, which cannot turn negative; "scalar" σ.
+        reward_scale: factor on the reward that the learner sees (ours).
+        max_bad_updates: consecutive updates skipped as non-finite that stop the run.
+    """
+
+    unroll_length: int = _number(24, 1)
+    epochs: int = _number(5, 1)
+    minibatches: int = _number(4, 1)
+    clip: float = _number(0.2, POSITIVE)
+    discount: float = _number(0.99, 0.0, 1.0)
+    gae_lambda: float = _number(0.95, 0.0, 1.0)
+    entropy_cost: float = _number(0.005, 0.0)
+    value_cost: float = _number(1.0, 0.0)
+    learning_rate: float = _number(1e-3, POSITIVE)
+    learning_rate_min: float = _number(1e-5, POSITIVE)
+    learning_rate_max: float = _number(1e-2, POSITIVE)
+    desired_kl: float = _number(0.01, POSITIVE)
+    max_grad_norm: float = _number(1.0, POSITIVE)
+    actor_layers: tuple[int, ...] = _number((512, 256, 128), 1)
+    critic_layers: tuple[int, ...] = _number((512, 256, 128), 1)
+    init_noise_std: float = _number(1.0, POSITIVE)
+    noise_std_type: Literal["log", "scalar"] = "log"
+    reward_scale: float = _number(1.0, POSITIVE)
+    max_bad_updates: int = _number(4, 1)
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """One training run.
+
+    Attributes:
+        task: registered name of the environment.
+        preset: name of the preset from which the run started.
+        seed: of networks, environments and action noise.
+        backend: physics backend of the environment.
+        num_envs: worlds stepped in parallel.
+        iterations: PPO iterations in all.
+        iterations_per_call: iterations compiled into one device call.
+        log_every: iterations between two rows of metrics.
+        checkpoint_every: iterations between two checkpoints.
+        keep_checkpoints: newest checkpoints kept on disk.
+        hang_limit_s: shortest time without progress that counts as a hang [s].
+        ppo: settings of the learner.
+    """
+
+    task: str = "crawl"
+    preset: str = "paper"
+    seed: int = _number(0, 0, 2**32 - 1)
+    backend: str = "cpu"
+    num_envs: int = _number(4096, 1)
+    iterations: int = _number(8000, 1, free=True)
+    iterations_per_call: int = _number(1, 1)
+    log_every: int = _number(10, 1, free=True)
+    checkpoint_every: int = _number(200, 1, free=True)
+    keep_checkpoints: int = _number(3, 1, free=True)
+    hang_limit_s: float = _number(300.0, POSITIVE, free=True)
+    ppo: PpoConfig = dataclasses.field(default_factory=PpoConfig)
+
+    @property
+    def steps_per_iteration(self) -> int:
+        """Control steps of all worlds in one iteration."""
+        return self.num_envs * self.ppo.unroll_length
+
+
+def paper() -> TrainConfig:
+    """Returns the paper's settings: 4,096 worlds, 8,000 iterations."""
+    return TrainConfig(preset="paper", num_envs=4096, iterations=8000)
+
+
+def fast() -> TrainConfig:
+    """Returns settings for one GPU: twice the worlds, fewer iterations."""
+    return TrainConfig(preset="fast", num_envs=8192, iterations=3000)
+
+
+def cpu() -> TrainConfig:
+    """Returns small settings for a few CPU cores: learning shows within minutes."""
+    ppo = PpoConfig(actor_layers=(256, 128), critic_layers=(256, 128))
+    return TrainConfig(
+        preset="cpu",
+        num_envs=256,
+        iterations=150,
+        log_every=2,
+        checkpoint_every=25,
+        ppo=ppo,
+    )
+
+
+PRESETS = {"paper": paper, "fast": fast, "cpu": cpu}
+
+
+def preset(name: str) -> TrainConfig:
+    """Returns a fresh configuration of the preset `name`.
+
+    Raises:
+        InputError: if there is no such preset.
+    """
+    if name not in PRESETS:
+        raise InputError("preset", "", name, one_of(PRESETS, name))
+    return PRESETS[name]()
+
+
+def bound_fields(config: TrainConfig) -> dict[str, Any]:
+    """Returns those fields, as plain data, that a resumed run must share."""
+    fields = {f.name for f in dataclasses.fields(config) if "free" not in f.metadata}
+    return {k: v for k, v in to_dict(config).items() if k in fields}

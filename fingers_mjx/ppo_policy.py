@@ -1,0 +1,109 @@
+"""The learned policy out of a checkpoint: for evaluation, export and warm starts."""
+
+import dataclasses
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.errors import InputError
+from fingers_mjx import checkpoint
+from fingers_mjx.checkpoint import Saved
+from fingers_mjx.ppo_state import TrainState
+
+_POLICY = "train/params/policy/params/"
+_NORMALIZER = "train/normalizer/"
+
+
+@dataclass(frozen=True)
+class Policy:
+    """Deterministic actor: normalize, then dense layers with ELU between them.
+
+    Attributes:
+        mean: of each observation, as seen in training.
+        std: its standard deviation, at least 1e-6.
+        layers: (kernel [in, out], bias [out]) from input to action.
+        noise_std: standard deviation of the exploration noise, per action.
+        meta: what was noted in the checkpoint: "iteration", "env_steps", "config", …
+    """
+
+    mean: Float[np.ndarray, " n"]
+    std: Float[np.ndarray, " n"]
+    layers: tuple[tuple[np.ndarray, np.ndarray], ...]
+    noise_std: Float[np.ndarray, " a"]
+    meta: dict[str, Any]
+
+
+def load_policy(path: Path) -> Policy:
+    """Returns the policy of a run directory (its newest checkpoint) or checkpoint.
+
+    Raises:
+        InputError: if there is no intact checkpoint.
+    """
+    saved = read(path)
+    arrays = saved.arrays
+    hidden = sorted(k for k in arrays if k.startswith(f"{_POLICY}MLP_0/hidden_"))
+    names = [k.removesuffix("/kernel") for k in hidden if k.endswith("/kernel")]
+    layers = [_dense(arrays, name) for name in (*names, f"{_POLICY}Dense_0")]
+    return Policy(
+        mean=arrays[f"{_NORMALIZER}mean/state"],
+        std=arrays[f"{_NORMALIZER}std/state"],
+        layers=tuple(layers),
+        noise_std=_noise(arrays),
+        meta=dict(saved.meta),
+    )
+
+
+def act(policy: Policy, obs: Float[Array, "*b n"]) -> Float[Array, "*b a"]:
+    """Returns the mean action, neither clipped nor squashed: the environment does that.
+
+    a = W_k elu(… elu(W_0 (obs - mean)/std + b_0) …) + b_k
+    """
+    hidden = (obs - policy.mean) / policy.std
+    for kernel, bias in policy.layers[:-1]:
+        hidden = jax.nn.elu(hidden @ kernel + bias)
+    kernel, bias = policy.layers[-1]
+    return hidden @ kernel + bias
+
+
+def read(path: Path, say: Callable[[str], None] = print) -> Saved:
+    """Returns the checkpoint at `path`, or the newest intact one of a run directory.
+
+    Raises:
+        InputError: if there is none.
+    """
+    inside = path / "checkpoints"
+    if not inside.is_dir():
+        return checkpoint.load(path)
+    newest = checkpoint.newest(inside, say)
+    if newest is None:
+        raise InputError(inside, "", "no checkpoint", "a run that has saved one")
+    return checkpoint.load(newest)
+
+
+def warm_started(train: TrainState, path: Path) -> TrainState:
+    """Returns the untrained `train` with networks and normalizer of `path`.
+
+    Raises:
+        InputError: if the networks differ, naming the first array.
+    """
+    template = {"train": {"params": train.params, "normalizer": train.normalizer}}
+    loaded = read(path).part(template)["train"]
+    return dataclasses.replace(train, **loaded)
+
+
+def _dense(
+    arrays: Mapping[str, np.ndarray], name: str
+) -> tuple[np.ndarray, np.ndarray]:
+    """Returns kernel and bias of the layer `name`."""
+    return arrays[f"{name}/kernel"], arrays[f"{name}/bias"]
+
+
+def _noise(arrays: Mapping[str, np.ndarray]) -> np.ndarray:
+    """Returns the standard deviation of the noise, however it is parametrized."""
+    log = arrays.get(f"{_POLICY}std_logparam/log_value")
+    return arrays[f"{_POLICY}std_param/value"] if log is None else np.exp(log)

@@ -1,0 +1,184 @@
+"""Experience: unroll the policy in the batched environment, set faulty steps aside."""
+
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
+
+from envs.base import State
+from fingers_mjx.ppo_brax import (
+    PPONetworkParams,
+    PPONetworks,
+    RunningStatisticsState,
+    sample_action,
+)
+from fingers_mjx.ppo_totals import Totals, count, total
+
+
+@runtime_checkable
+class BatchEnv(Protocol):
+    """What the learner needs of an environment: worlds in step, reset by themselves."""
+
+    @property
+    def num_envs(self) -> int:
+        """Number of worlds."""
+        ...
+
+    @property
+    def action_size(self) -> int:
+        """Number of policy outputs."""
+        ...
+
+    @property
+    def observation_size(self) -> Mapping[str, int]:
+        """Sizes of "state" and "privileged_state"."""
+        ...
+
+    def reset(self, key: PRNGKeyArray) -> State:
+        """Starts an episode in every world."""
+        ...
+
+    def step(self, state: State, action: Float[Array, "b a"]) -> State:
+        """Advances every world by one control step."""
+        ...
+
+
+FAULTS = ("nothing", "state", "reward", "observation")
+"""What can be non-finite in a step; "state" is what the environment itself reports."""
+
+
+@flax.struct.dataclass
+class Rollout:
+    """Experience of one iteration, time first.
+
+    Attributes:
+        obs: observations that the policy saw; rows that were not finite are zero.
+        last_obs: critic's observation after the last step.
+        action: unclipped policy output.
+        log_prob: log-probability of `action` when it was drawn.
+        logits: mean and standard deviation of the policy when it acted.
+        reward: reward of the step; zero where the step is not valid.
+        done: 1 if the episode ended in the step.
+        truncation: 1 if it ended without a failure, or the step is not valid.
+        fault: index into `FAULTS` of what was wrong with the step; 0 if nothing.
+    """
+
+    obs: dict[str, Float[Array, "t b _"]]
+    last_obs: Float[Array, "b m"]
+    action: Float[Array, "t b a"]
+    log_prob: Float[Array, "t b"]
+    logits: tuple[Float[Array, "t b a"], Float[Array, "t b a"]]
+    reward: Float[Array, "t b"]
+    done: Float[Array, "t b"]
+    truncation: Float[Array, "t b"]
+    fault: Int[Array, "t b"]
+
+    @property
+    def valid(self) -> Bool[Array, "t b"]:
+        """Whether each step may be learned from."""
+        return self.fault == 0
+
+
+def unroll(
+    env: BatchEnv,
+    networks: PPONetworks,
+    params: PPONetworkParams,
+    normalizer: RunningStatisticsState,
+    state: State,
+    key: PRNGKeyArray,
+    length: int,
+) -> tuple[State, Rollout, Totals]:
+    """Returns the worlds after `length` steps, their experience and its figures.
+
+    A step is not valid if the environment says so (`info["invalid"]`), or if its
+    reward, or the observation before or after it, is not finite. It is then truncated
+    with reward zero, which takes it out of loss and normalizer; the other worlds are
+    not touched.
+    """
+
+    def act(state: State, key: PRNGKeyArray) -> tuple[State, dict[str, Any]]:
+        obs, obs_ok = screen(state.obs)
+        logits = networks.policy_network.apply(normalizer, params.policy, obs)
+        action, log_prob = sample_action(networks, logits, key)
+        state = fixed_types(env.step(state, action))
+        drawn = {"obs": obs, "action": action, "log_prob": log_prob, "logits": logits}
+        return state, {**drawn, "obs_ok": obs_ok, **_outcome(state)}
+
+    state, steps = jax.lax.scan(act, state, jax.random.split(key, length))
+    last_obs, last_ok = screen(state.obs)
+    ok = jnp.concatenate([steps.pop("obs_ok"), last_ok[None]])
+    totals = jax.tree.map(lambda x: jnp.sum(x, axis=0), steps.pop("totals"))
+    rollout = _seal(steps, ok[:-1] & ok[1:], last_obs["privileged_state"])
+    return state, rollout, totals | rollout_totals(rollout)
+
+
+def fixed_types(tree: Any) -> Any:
+    """Returns `tree` without weak types, for which the next call would recompile."""
+
+    def fix(leaf: Array) -> Array:
+        if jnp.issubdtype(leaf.dtype, jax.dtypes.extended):
+            return leaf
+        return jax.lax.convert_element_type(leaf, leaf.dtype)
+
+    return jax.tree.map(fix, tree)
+
+
+def screen(
+    obs: Mapping[str, Float[Array, "b _"]],
+) -> tuple[dict[str, Float[Array, "b _"]], Bool[Array, " b"]]:
+    """Returns `obs` with zeros in worlds that have a non-finite value, and the rest."""
+    rows = [jnp.all(jnp.isfinite(x), axis=-1) for x in obs.values()]
+    ok = jnp.all(jnp.stack(rows), axis=0)
+    return {k: jnp.where(ok[:, None], x, 0.0) for k, x in obs.items()}, ok
+
+
+def _outcome(state: State) -> dict[str, Any]:
+    """Returns what one step gave: reward, endings, faults and figures."""
+    reported, finite = state.info["invalid"] != 0, jnp.isfinite(state.reward)
+    return {
+        "reward": state.reward,
+        "done": state.done,
+        "truncation": state.info["truncation"],
+        "fault": jnp.where(reported, 1, jnp.where(finite, 0, 2)),
+        "totals": _step_totals(state, ~reported & finite),
+    }
+
+
+def _step_totals(state: State, healthy: Bool[Array, " b"]) -> Totals:
+    """Returns return and length of the episodes that ended, and the mean metrics."""
+    ended = (state.done > 0) & healthy
+    totals = {name: total(x, healthy) for name, x in state.metrics.items()}
+    totals["episode/return"] = total(state.info["episode_return"], ended)
+    totals["episode/length"] = total(state.info["episode_length"], ended)
+    return totals
+
+
+def _seal(
+    steps: dict[str, Any], obs_ok: Bool[Array, "t b"], last_obs: Float[Array, "b m"]
+) -> Rollout:
+    """Returns the experience with its faulty steps truncated and without reward."""
+    seen = jnp.where(obs_ok, 0, FAULTS.index("observation"))
+    steps["fault"] = jnp.where(steps["fault"] == 0, seen, steps["fault"])
+    valid = steps["fault"] == 0
+    steps["reward"] = jnp.where(valid, steps["reward"], 0.0)
+    steps["truncation"] = jnp.where(valid, steps["truncation"], 1.0)
+    steps["done"] = jnp.where(valid, steps["done"], 1.0)
+    return Rollout(last_obs=last_obs, **steps)
+
+
+def rollout_totals(rollout: Rollout) -> Totals:
+    """Returns figures of the whole rollout: invalid steps, endings, noise, entropy."""
+    std = rollout.logits[1]
+    entropy = jnp.sum(jnp.log(std) + 0.5 * jnp.log(2 * jnp.pi * jnp.e), axis=-1)
+    ended = rollout.valid & (rollout.done > 0)
+    failed = ended & (rollout.truncation == 0)
+    return {
+        "invalid": count(~rollout.valid),
+        "episode/ended": count(ended),
+        "episode/failed": count(failed),
+        "policy/std": total(std),
+        "policy/entropy": total(entropy),
+    }

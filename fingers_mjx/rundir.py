@@ -1,0 +1,191 @@
+"""Run directory: one writer at a time, and what anything can be rebuilt from.
+
+config.yaml     resolved configuration
+run.json        what a resumed run must share, and the format of this directory
+versions.json   packages, Python, platform, commit (no host or user names)
+metrics.jsonl   learning curve; events.out.tfevents.0: the same for TensorBoard
+checkpoints/    whole training states
+eval/           evaluations
+"""
+
+import fcntl
+import json
+import os
+import platform
+import subprocess
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from typing import Any, TypeVar
+
+from envs.config import dump_yaml, load_yaml
+from envs.errors import InputError
+from fingers_mjx.rundir_files import write_whole
+
+T = TypeVar("T")
+FORMAT = 1
+LOCK = "run.lock"
+PACKAGES = (
+    "fingers-mjx",
+    "jax",
+    "jaxlib",
+    "brax",
+    "flax",
+    "optax",
+    "orbax-checkpoint",
+    "mujoco",
+    "mujoco-mjx",
+    "mujoco-warp",
+    "warp-lang",
+    "numpy",
+)
+
+
+@contextmanager
+def open_run(path: Path, resume: bool) -> Iterator[Path]:
+    """Makes (or with `resume` opens) the run directory `path` and locks it.
+
+    Yields:
+        the directory, absolute, with its subdirectories.
+
+    Raises:
+        InputError: if a new run would write over something, if there is no run to
+            resume, or if another process is writing to it.
+    """
+    path = path.absolute()
+    _check_purpose(path, resume)
+    for directory in (path, path / "checkpoints", path / "eval"):
+        directory.mkdir(parents=True, exist_ok=True)
+    with _locked(path / LOCK):
+        _check_purpose(path, resume)
+        yield path
+
+
+def record_run(path: Path, config: Mapping[str, Any], bound: Mapping[str, Any]) -> None:
+    """Writes configuration, versions and what a resumed run must share."""
+    text = dump_yaml(config)
+    write_whole(path / "versions.json", _json(versions()))
+    write_whole(path / "run.json", _json({"format": FORMAT, "bound": bound}))
+    write_whole(path / "config.yaml", text.encode())
+
+
+def saved_config(path: Path, cls: type[T]) -> T:
+    """Returns the configuration that a run was made with, as the dataclass `cls`.
+
+    Args:
+        path: run directory.
+        cls: with the fields `train` (TrainConfig) and `env`.
+
+    Raises:
+        InputError: if `path` is not a run directory that this version can read.
+    """
+    _read_run(path)
+    return load_yaml(cls, path / "config.yaml")
+
+
+def check_bound(path: Path, current: Mapping[str, Any]) -> None:
+    """Raises InputError if the run at `path` was made with something else.
+
+    Args:
+        path: of the run.
+        current: nested names and values that must be the same.
+
+    Raises:
+        InputError: naming the first field that differs, its saved and current value.
+    """
+    saved, now = _flat(_read_run(path)["bound"]), _flat(json.loads(_json(current)))
+    for name in sorted(saved.keys() | now.keys()):
+        was, found = saved.get(name, "nothing"), now.get(name, "nothing")
+        if was != found:
+            valid = f"{was} as saved (--warm-start takes the policy across)"
+            raise InputError(path, name, found, valid)
+
+
+def versions() -> dict[str, Any]:
+    """Returns versions of packages, Python and platform, and the commit if any."""
+    packages = {name: _version(name) for name in PACKAGES}
+    return {
+        "packages": {k: v for k, v in packages.items() if v},
+        "python": platform.python_version(),
+        "platform": f"{platform.system()} {platform.machine()}",
+        "commit": _commit(),
+    }
+
+
+def _check_purpose(path: Path, resume: bool) -> None:
+    """Raises InputError if `path` does not suit a new run, or one to resume."""
+    if resume:
+        _read_run(path)
+        return
+    if path.exists() and not path.is_dir():
+        raise InputError(path, "", "a file", "a directory to make")
+    ours = {LOCK, "checkpoints", "eval", "versions.json", "run.json"}
+    names = {p.name for p in path.iterdir()} if path.exists() else set()
+    if names - ours - {f".{n}.tmp" for n in ("versions.json", "run.json")}:
+        valid = "a new or empty directory (--resume goes on with a run)"
+        raise InputError(path, "", "a directory in use", valid)
+
+
+def _read_run(path: Path) -> dict[str, Any]:
+    """Returns `run.json` of a complete run directory of this format."""
+    try:
+        run = json.loads((path / "run.json").read_text(encoding="utf-8"))
+        complete = (path / "config.yaml").exists()
+    except (OSError, ValueError):
+        run, complete = {}, False
+    if not (complete and isinstance(run, dict)):
+        raise InputError(path, "", "no run", "a directory made by fingers train")
+    if run.get("format") != FORMAT:
+        found = run.get("format", "nothing")
+        raise InputError(path / "run.json", "format", found, str(FORMAT))
+    return run
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """Holds the lock file `path`; the system frees it however the process ends."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
+    try:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            valid = "a run that no other process is writing to"
+            raise InputError(path.parent, "", "a run in progress", valid) from None
+        yield
+    finally:
+        os.close(handle)
+
+
+def _flat(tree: Any, prefix: str = "") -> dict[str, Any]:
+    """Returns the leaves of nested dicts by dotted name."""
+    if not isinstance(tree, Mapping):
+        return {prefix: tree}
+    flat: dict[str, Any] = {}
+    for name, value in tree.items():
+        flat |= _flat(value, f"{prefix}.{name}" if prefix else name)
+    return flat
+
+
+def _json(value: Any) -> bytes:
+    """Returns `value` as indented JSON."""
+    return (json.dumps(value, indent=1) + "\n").encode()
+
+
+def _version(package: str) -> str:
+    """Returns the installed version of `package`, or an empty string."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return ""
+
+
+def _commit() -> str:
+    """Returns the commit of the source tree, or an empty string if it has none."""
+    here = Path(__file__).parent
+    command = ["git", "-C", str(here), "rev-parse", "HEAD"]
+    try:
+        done = subprocess.run(command, capture_output=True, timeout=10, check=True)
+    except (OSError, subprocess.SubprocessError):
+        return ""
+    return done.stdout.decode().strip()

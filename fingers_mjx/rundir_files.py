@@ -1,0 +1,67 @@
+"""Files of a run: written whole or not at all, readable by all, full disks named."""
+
+import errno
+import os
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from fingers_mjx.train_errors import OutOfSpace
+
+FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+@contextmanager
+def room_for(path: Path, needed: int) -> Iterator[None]:
+    """Turns every sign of a full disk while `path` is written into OutOfSpace.
+
+    Args:
+        path: what is written; its directory exists.
+        needed: its size [bytes]; if the disk has less, nothing is tried.
+
+    Raises:
+        OutOfSpace: naming the path and the bytes needed.
+    """
+    if _free(path.parent) < needed:
+        raise OutOfSpace(path, needed, _free(path.parent))
+    try:
+        yield
+    except Exception as error:
+        if not is_full(error):
+            raise
+        raise OutOfSpace(path, needed, _free(path.parent)) from error
+
+
+def is_full(error: BaseException) -> bool:
+    """Tells whether `error` means a full disk, a quota or a limit of file size.
+
+    Orbax reports what its C++ layer met as text only.
+    """
+    if isinstance(error, OSError) and error.errno in FULL:
+        return True
+    return any(os.strerror(number) in str(error) for number in FULL)
+
+
+def write_whole(path: Path, content: bytes) -> None:
+    """Writes a file so that at any moment either all of it is there or the old one.
+
+    Raises:
+        OutOfSpace: if the disk is full; the old file is intact.
+    """
+    tmp = path.with_name(f".{path.name}.tmp")
+    try:
+        with room_for(path, len(content)):
+            with tmp.open("wb") as file:
+                file.write(content)
+                file.flush()
+                os.fsync(file.fileno())
+            tmp.chmod(0o644)
+            tmp.replace(path)
+    finally:
+        tmp.unlink(missing_ok=True)
+
+
+def _free(directory: Path) -> int:
+    """Returns the room left on the disk of `directory` [bytes]."""
+    return shutil.disk_usage(directory).free

@@ -1,0 +1,106 @@
+"""Learning curve on disk: one JSON line per row, and the same as TensorBoard events."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from tensorboardX.proto.event_pb2 import Event  # pyright: ignore
+from tensorboardX.proto.summary_pb2 import Summary  # pyright: ignore
+from tensorboardX.record_writer import RecordWriter
+
+from fingers_mjx.rundir_files import room_for, write_whole
+
+Row = Mapping[str, Any]
+_STEP, _TIME = "iteration", "time_s"
+
+
+class MetricsLog:
+    """Appends rows to `metrics.jsonl` and to a TensorBoard event file beside it.
+
+    Opened after a restart, it drops the rows later than the iteration that was
+    restored (and a line cut short by a kill), and writes the event file anew from the
+    rows kept, so that the curve goes on without a seam.
+
+    Args:
+        directory: of the run.
+        iteration: iterations done when the log is opened.
+    """
+
+    def __init__(self, directory: Path, iteration: int):
+        self._path = directory / "metrics.jsonl"
+        rows = [r for r in read_metrics(self._path) if r[_STEP] <= iteration]
+        write_whole(self._path, "".join(map(_line, rows)).encode())
+        events = directory / "events.out.tfevents.0"
+        with room_for(events, 0):
+            self._events = RecordWriter(str(events))
+            events.chmod(0o644)
+            self._write_event(Event(wall_time=0.0, file_version="brain.Event:2"))
+            for row in rows:
+                self._write_event(_event(row))
+            self._events.flush()
+
+    def append(self, row: Row) -> None:
+        """Adds one row; it needs "iteration" and "time_s" (seconds since 1970).
+
+        Raises:
+            OutOfSpace: if the disk is full.
+        """
+        line = _line(row)
+        with room_for(self._path, len(line)):
+            with self._path.open("a", encoding="utf-8") as file:
+                file.write(line)
+            self._write_event(_event(row))
+            self._events.flush()
+
+    def __enter__(self) -> "MetricsLog":
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._events.close()
+
+    def _write_event(self, event: Event) -> None:
+        """Appends one event."""
+        self._events.write(event.SerializeToString())
+
+
+def read_metrics(path: Path) -> list[dict[str, Any]]:
+    """Returns the rows of a `metrics.jsonl`, up to the first line that is cut short."""
+    rows: list[dict[str, Any]] = []
+    if not path.exists():
+        return rows
+    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+        try:
+            rows.append(json.loads(line))
+        except ValueError:
+            break
+    return rows
+
+
+def _line(row: Row) -> str:
+    """Returns `row` as one line of JSON; figures that are not finite become null."""
+    return json.dumps({k: _number(v) for k, v in row.items()}) + "\n"
+
+
+def _number(value: Any) -> Any:
+    """Returns `value`, or None for a float that JSON cannot hold."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _event(row: Row) -> Event:
+    """Returns the figures of `row` as one TensorBoard event."""
+    numbers = {k: v for k, v in row.items() if isinstance(v, int | float)}
+    values = [
+        Summary.Value(tag=name, simple_value=float(value))
+        for name, value in numbers.items()
+        if name not in (_STEP, _TIME)
+    ]
+    summary = Summary(value=values)
+    return Event(wall_time=row[_TIME], step=row[_STEP], summary=summary)

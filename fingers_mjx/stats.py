@@ -1,0 +1,149 @@
+"""Statistics of evaluations: intervals over episodes, paired differences over seeds."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import binomtest, bootstrap
+
+from envs.errors import InputError
+
+RESAMPLES = 4999
+
+
+@dataclass(frozen=True)
+class Summary:
+    """A mean with its spread and its confidence interval.
+
+    Attributes:
+        mean: of the defined values; NaN if there are none.
+        std: sample standard deviation (n - 1); NaN below two values.
+        n: how many values are defined (not NaN).
+        low: lower end of the confidence interval; NaN below two values.
+        high: upper end.
+    """
+
+    mean: float
+    std: float
+    n: int
+    low: float
+    high: float
+
+
+def summarize(
+    values: Float[np.ndarray, " n"], confidence: float = 0.95, seed: int = 0
+) -> Summary:
+    """Summarizes one number per episode or per seed.
+
+    NaN marks a measure that an episode does not define (such as the speed of an episode
+    without a speed command); it is left out and `n` counts the rest. The interval is a
+    bias-corrected and accelerated bootstrap (Efron 1987) of the mean. For values that
+    are all 0 or 1 it is Wilson's score interval of a proportion, because resampling 256
+    successes out of 256 says nothing about the failure that was not seen.
+
+    Args:
+        values: one number per independent unit.
+        confidence: coverage of the interval.
+        seed: of the resampling.
+
+    Raises:
+        InputError: a value is infinite.
+    """
+    if np.isinf(values).any():
+        raise InputError("summarize", "values", "infinity", "finite numbers or NaN")
+    defined = np.asarray(values, float)[~np.isnan(values)]
+    if len(defined) > 1 and np.isin(defined, (0.0, 1.0)).all():
+        return _summary(defined, _wilson(defined, confidence))
+    return _summary(defined, bootstrap_interval(defined, confidence, seed))
+
+
+def bootstrap_interval(
+    values: Float[np.ndarray, " n"],
+    confidence: float = 0.95,
+    seed: int = 0,
+    statistic: Callable[..., np.ndarray] = np.mean,
+) -> tuple[float, float]:
+    """Returns the BCa bootstrap interval of a statistic; NaN below two values.
+
+    Values that are all equal give an interval of width zero. Where leaving one value
+    out never moves the statistic, BCa is undefined (0/0) and percentiles are returned.
+
+    Args:
+        values: defined numbers, one per independent unit.
+        confidence: coverage of the interval.
+        seed: of the resampling.
+        statistic: takes an array and an `axis`.
+    """
+    if len(values) < 2:
+        return np.nan, np.nan
+    if np.ptp(values) == 0:
+        return float(values[0]), float(values[0])
+    left_out = [statistic(np.delete(values, i), axis=-1) for i in range(len(values))]
+    found = bootstrap(
+        (values,),
+        statistic,
+        confidence_level=confidence,
+        n_resamples=RESAMPLES,
+        batch=500,
+        method="BCa" if np.ptp(left_out) > 0 else "percentile",
+        rng=np.random.default_rng(seed),
+    ).confidence_interval
+    return float(found.low), float(found.high)
+
+
+def paired_difference(
+    ours: Float[np.ndarray, " seeds"],
+    other: Float[np.ndarray, " seeds"],
+    confidence: float = 0.95,
+    seed: int = 0,
+) -> Summary:
+    """Summarizes ours - other over seeds that both were trained on.
+
+    Seeds, not episodes, are resampled: episodes of one policy are not independent
+    evidence about the training method. A seed that either side does not define is left
+    out.
+
+    Args:
+        ours: one number per seed.
+        other: the same seeds in the same order.
+        confidence: coverage of the interval.
+        seed: of the resampling.
+
+    Raises:
+        InputError: the two sides differ in length.
+    """
+    if len(ours) != len(other):
+        found, valid = f"{len(other)} seeds", f"{len(ours)} seeds as the first"
+        raise InputError("paired_difference", "other", found, valid)
+    difference = np.asarray(ours, float) - np.asarray(other, float)
+    difference = difference[~np.isnan(difference)]
+    return _summary(difference, bootstrap_interval(difference, confidence, seed))
+
+
+def interquartile_mean(values: Float[np.ndarray, "*b n"], axis: int = -1) -> np.ndarray:
+    """Returns the mean of the middle half of sorted values.
+
+    floor(n / 4) values are cut from each end, as in Agarwal et al. 2021, "Deep
+    Reinforcement Learning at the Edge of the Statistical Precipice".
+
+    Args:
+        values: numbers without NaN.
+        axis: the axis of independent units.
+    """
+    ordered = np.sort(np.moveaxis(np.asarray(values, float), axis, -1), axis=-1)
+    cut = ordered.shape[-1] // 4
+    return ordered[..., cut : ordered.shape[-1] - cut].mean(axis=-1)
+
+
+def _summary(defined: np.ndarray, interval: tuple[float, float]) -> Summary:
+    count = len(defined)
+    mean = float(defined.mean()) if count else np.nan
+    spread = float(defined.std(ddof=1)) if count > 1 else np.nan
+    return Summary(mean, spread, count, *interval)
+
+
+def _wilson(values: np.ndarray, confidence: float) -> tuple[float, float]:
+    test = binomtest(int(values.sum()), len(values))
+    found = test.proportion_ci(confidence, method="wilson")
+    return float(found.low), float(found.high)

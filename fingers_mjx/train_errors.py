@@ -1,0 +1,65 @@
+"""Ways a training run can end early; each knows its exit status."""
+
+from pathlib import Path
+
+
+class Diverged(RuntimeError):
+    """Learning broke down: too many updates in a row were not finite (status 3).
+
+    Args:
+        term: first non-finite term, such as "loss/value" or "params/policy/…".
+        iteration: iteration in which the streak of bad updates began.
+        skipped: number of bad updates in a row.
+        dump: file with the state, all of it from before the first bad update.
+        checkpoint: newest complete checkpoint, if there is one.
+    """
+
+    exit_code = 3
+
+    def __init__(
+        self,
+        term: str,
+        iteration: int,
+        skipped: int,
+        dump: Path,
+        checkpoint: Path | None,
+    ):
+        self.term, self.iteration, self.skipped = term, iteration, skipped
+        self.dump, self.checkpoint = dump, checkpoint
+        good = f"last checkpoint {checkpoint}" if checkpoint else "no checkpoint yet"
+        super().__init__(
+            f"diverged at iteration {iteration}: {term} is not finite, {skipped} "
+            f"updates in a row skipped; state saved in {dump}; {good}"
+        )
+
+
+class Interrupted(RuntimeError):
+    """A signal stopped the run after a checkpoint was written (status 75)."""
+
+    exit_code = 75
+
+    def __init__(self, checkpoint: Path, iteration: int):
+        self.checkpoint, self.iteration = checkpoint, iteration
+        super().__init__(
+            f"stopped after iteration {iteration}; saved in {checkpoint}; "
+            "go on with --resume"
+        )
+
+
+class OutOfSpace(OSError):
+    """The disk has no room for what should be written (status 4).
+
+    Args:
+        path: what was being written.
+        needed: its size [bytes].
+        free: room left on the disk [bytes].
+    """
+
+    exit_code = 4
+
+    def __init__(self, path: Path, needed: int, free: int):
+        self.path, self.needed, self.free = path, needed, free
+        super().__init__(
+            f"no room for {path}: needs {needed:,} bytes, {free:,} free; "
+            "what was saved before is intact"
+        )

@@ -1,0 +1,44 @@
+"""Contacts: links that should not touch, tips that should not slide."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from rewards.gates import FORCE_THRESHOLD_N, in_contact
+from rewards.shaping import Scalar, safe_norm
+
+
+def undesired_contact(link_contact: Float[Array, " links"]) -> Float[Array, ""]:
+    """Number of links other than fingertips that touch the ground, Σ c.
+
+    Args:
+        link_contact: 1 for each link in contact, else 0.
+
+    Returns:
+        Magnitude, a count in [0, links].
+
+    Source:
+        Paper, undesired contact; Isaac Lab, `undesired_contacts`.
+    """
+    return jnp.sum(link_contact)
+
+
+def foot_slide(
+    tip_vel_w: Float[Array, "tips 3"],
+    tip_force_n: Float[Array, " tips"],
+    force_threshold_n: Scalar = FORCE_THRESHOLD_N,
+) -> Float[Array, ""]:
+    """Horizontal speed of the tips in contact, Σ_j [F_j ≥ F_th] |v_xy,j|.
+
+    Args:
+        tip_vel_w: tip velocities in the world [m/s], z vertical.
+        tip_force_n: contact force magnitudes [N].
+        force_threshold_n: F_th [N].
+
+    Returns:
+        Magnitude [m/s], ≥ 0; 0 when planted tips stand still.
+
+    Source:
+        Isaac Lab, `feet_slide`.
+    """
+    speed_mps = safe_norm(tip_vel_w[:, :2])
+    return jnp.sum(jnp.where(in_contact(tip_force_n, force_threshold_n), speed_mps, 0))

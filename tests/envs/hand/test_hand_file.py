@@ -1,0 +1,175 @@
+import dataclasses
+import math
+import random
+
+import numpy as np
+import pytest
+
+from envs.config import dump_yaml, from_dict, override, to_dict
+from envs.errors import InputError
+from envs.hand import hand_file
+from envs.hand.figures import figures
+from envs.hand.hand_file import (
+    DEFAULT_HAND_FILE,
+    Effect,
+    HandFile,
+    Quantity,
+    load_hand_file,
+    save_hand_file,
+)
+
+SEED = 20260102
+HAND = load_hand_file()
+JOINTS = figures().joint_names
+
+
+def test_masses_are_those_of_the_weighed_hand():
+    links = sum(figures().per_joint("mass"))
+    assert HAND.palm_mass.value + links == pytest.approx(0.738, abs=1e-9)
+    total = HAND.palm_mass.value + links + HAND.payload_mass.value
+    assert total == pytest.approx(0.818, abs=1e-9)
+
+
+def test_payload_lies_on_the_back():
+    front = HAND.payload_pos.value[0] + HAND.payload_size.value[0] / 2
+    assert front == pytest.approx(figures().palm.bounds_min[0], abs=1e-9)
+
+
+def test_damping_keeps_the_nominal_damping_ratio():
+    """kd / (2 sqrt(kp I)) does not change when kp is scaled by s and kd by sqrt(s)."""
+    expected = math.sqrt(HAND.stiffness_scale.per_joint()[0])
+    np.testing.assert_allclose(HAND.damping_scale.per_joint(), expected, rtol=1e-6)
+
+
+def test_abduction_is_slower():
+    speeds = HAND.speed_limit.per_joint().reshape(5, 4)
+    np.testing.assert_array_equal(speeds, np.tile([2.8, 2.5, 2.8, 2.8], (5, 1)))
+
+
+def test_default_file_is_written_back_byte_for_byte(tmp_path):
+    save_hand_file(HAND, tmp_path / "hand.yaml")
+    assert (tmp_path / "hand.yaml").read_bytes() == DEFAULT_HAND_FILE.read_bytes()
+    assert [path.name for path in tmp_path.iterdir()] == ["hand.yaml"]
+
+
+def test_random_hands_survive_a_round_trip_exactly(tmp_path):
+    print(f"seed {SEED}")
+    rng = np.random.default_rng(SEED)
+    for _ in range(20):
+        scales = [float(scale) for scale in rng.uniform(1, 30, 20)]
+        as_dict = dict(zip(JOINTS, scales, strict=True))
+        data = to_dict(HAND)
+        data["stiffness_scale"] |= {"value": scales, "low": None, "high": as_dict}
+        data["torque_scale"]["value"] = {k: v / 30 for k, v in as_dict.items()}
+        data["delay_s"]["value"] = float(rng.uniform(0, 0.2))
+        hand = from_dict(HandFile, data, "memory")
+        save_hand_file(hand, tmp_path / "hand.yaml")
+        assert load_hand_file(tmp_path / "hand.yaml") == hand
+        assert load_hand_file(tmp_path / "hand.yaml").sha256 == hand.sha256
+
+
+def test_forms_of_a_per_joint_quantity_agree():
+    values = np.arange(1.0, 21.0)
+    shuffled = list(range(20))
+    random.Random(SEED).shuffle(shuffled)
+    by_name = {JOINTS[i]: float(values[i]) for i in shuffled}
+    forms = (tuple(values.tolist()), by_name)
+    for form in forms:
+        scale = dataclasses.replace(
+            HAND.stiffness_scale, value=form, low=None, high=None
+        )
+        np.testing.assert_array_equal(scale.per_joint(), values)
+    scalar = dataclasses.replace(HAND.torque_scale, value=0.5)
+    np.testing.assert_array_equal(scalar.per_joint(), np.full(20, 0.5))
+
+
+def test_digest_is_of_the_contents(tmp_path):
+    path = tmp_path / "hand.yaml"
+    text = "# mine\n" + DEFAULT_HAND_FILE.read_text("utf-8").replace("0.08,", "8e-2,")
+    path.write_text(text, encoding="utf-8")
+    assert load_hand_file(path).sha256 == HAND.sha256
+    path.write_text(text.replace("8e-2,", "8.1e-2,"), encoding="utf-8")
+    assert load_hand_file(path).sha256 != HAND.sha256
+
+
+def test_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
+    path = tmp_path / "hand.yaml"
+    save_hand_file(HAND, path)
+
+    def fail(*_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr(hand_file.os, "replace", fail)
+    with pytest.raises(OSError, match="disk full"):
+        save_hand_file(dataclasses.replace(HAND, name="other"), path)
+    assert load_hand_file(path) == HAND
+    assert [item.name for item in tmp_path.iterdir()] == ["hand.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("assignment", "field", "valid"),
+    [
+        ("schema=2", "schema", "1"),
+        ("palm_mass.value=-1", "palm_mass.value", "0.01 to 5 [kg]"),
+        ("palm_mass.value=.nan", "palm_mass.value", "a finite number"),
+        ("palm_mass.unit=g", "palm_mass.unit", "kg"),
+        ("palm_mass.source=guess", "palm_mass.source", "identified from"),
+        ("palm_mass.source='identified from '", "palm_mass.source", "identified from"),
+        ("palm_mas.value=1", "palm_mas", "did you mean palm_mass?"),
+        ("stiffness_scale.value=30", "stiffness_scale.value", "high is 22.0"),
+        ("stiffness_scale.low=20", "stiffness_scale.value", "low is 20.0"),
+        ("stiffness_scale.value=[18, 18, 18]", "stiffness_scale.value", "20 numbers"),
+        (
+            "torque_scale.value={finger1_joint5: 1}",
+            "torque_scale.value.finger1_joint5",
+            "did you mean finger1_joint",
+        ),
+        ("torque_scale.value={finger1_joint1: 1}", "torque_scale.value", "also finger"),
+        ("speed_limit.value.3=1000", "speed_limit.value", "0.01 to 100 [rad/s]"),
+        ("delay_s.value=0.5", "delay_s.value", "0 to 0.2 [s]"),
+        ("payload_pos.value=[0, 0]", "payload_pos.value", "a list of 3"),
+        ("effects=[{name: backlash}]", "effects.0.name", "no effect"),
+        ("effects=[backlash]", "effects.0", "a mapping of name, parameters"),
+    ],
+)
+def test_mistakes_are_named(assignment, field, valid):
+    with pytest.raises(InputError) as caught:
+        override(HAND, [assignment])
+    assert caught.value.field == field
+    assert valid in str(caught.value)
+
+
+def test_sources():
+    for source in ("paper", "vendor", "ours", "user", "identified from 3f2a"):
+        assert Quantity(1.0, "1", source).source == source
+
+
+def test_missing_field_and_malformed_file(tmp_path):
+    path = tmp_path / "hand.yaml"
+    data = to_dict(HAND)
+    del data["lowpass_hz"]
+    path.write_text(dump_yaml(data), encoding="utf-8")
+    with pytest.raises(InputError, match="lowpass_hz"):
+        load_hand_file(path)
+    path.write_bytes(DEFAULT_HAND_FILE.read_bytes()[:700])
+    with pytest.raises(InputError, match=r"hand\.yaml"):
+        load_hand_file(path)
+
+
+def test_effects_are_checked_against_the_catalogue(monkeypatch):
+    monkeypatch.setitem(hand_file.EFFECTS, "backlash", {"width": "rad"})
+    width = {"value": 0.01, "unit": "rad", "source": "identified from 3f2a"}
+    data = to_dict(HAND)
+    data["effects"] = [{"name": "backlash", "parameters": {"width": width}}]
+    hand = from_dict(HandFile, data, "memory")
+    assert isinstance(hand.effects[0], Effect)
+    assert from_dict(HandFile, to_dict(hand), "memory") == hand
+    for name, parameters in (
+        ("backlsh", {"width": width}),
+        ("backlash", {}),
+        ("backlash", {"width": width | {"unit": "deg"}}),
+        ("backlash", {"width": width, "more": width}),
+    ):
+        data["effects"] = [{"name": name, "parameters": parameters}]
+        with pytest.raises(InputError, match=r"effects\.0"):
+            from_dict(HandFile, data, "memory")

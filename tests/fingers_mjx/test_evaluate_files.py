@@ -1,0 +1,79 @@
+import json
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+
+from envs.errors import InputError
+from fingers_mjx import evaluate_files
+from fingers_mjx.evaluate_files import (
+    read_table,
+    summary_document,
+    write_atomic,
+    write_summary,
+    write_table,
+)
+
+COLUMNS = {
+    "task_speed_mps": np.array([0.1, 0.2, np.nan, 0.3]),
+    "survival": np.array([1.0, 1.0, 0.0, 1.0]),
+    "mean_contact_tilt_deg": np.full(4, np.nan),
+}
+
+
+def test_table_comes_back_with_its_description(tmp_path):
+    path = write_table(tmp_path / "episodes.parquet", COLUMNS, {"task": "crawl"})
+    found = read_table(path)
+    np.testing.assert_array_equal(found.pop("episode"), np.arange(4))
+    assert found.keys() == COLUMNS.keys()
+    for name, values in COLUMNS.items():
+        np.testing.assert_array_equal(found[name], values)
+    assert pq.read_schema(path).metadata[b"task"] == b"crawl"
+
+
+@pytest.mark.parametrize("content", [None, b"", b"PAR1 but not really"])
+def test_no_table_is_one_sentence(tmp_path, content):
+    path = tmp_path / "episodes.parquet"
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(InputError, match=r"episodes\.parquet.*a Parquet table"):
+        read_table(path)
+
+
+def test_summary_has_what_readers_rely_on(tmp_path):
+    document = summary_document(COLUMNS, "crawl", "bundle", 3, 1_000, commit="abc")
+    path = write_summary(tmp_path / "eval.json", document)
+    found = json.loads(path.read_text(encoding="utf-8"), parse_constant=pytest.fail)
+    measures = found.pop("measures")
+    assert found == {
+        "task": "crawl",
+        "policy": "bundle",
+        "episodes": 4,
+        "seed": 3,
+        "steps_trained": 1_000,
+        "commit": "abc",
+    }
+    assert measures.keys() == COLUMNS.keys()
+    speed = measures["task_speed_mps"]
+    assert speed.keys() == {"mean", "std", "n", "low", "high"}
+    assert speed["n"] == 3
+    np.testing.assert_allclose([speed["mean"], speed["std"]], [0.2, 0.1])
+    assert measures["survival"]["mean"] == 0.75
+    undefined = {"mean": None, "std": None, "n": 0, "low": None, "high": None}
+    assert measures["mean_contact_tilt_deg"] == undefined
+    assert "commit" not in summary_document(COLUMNS, "crawl", "bundle", 3, 1_000)
+
+
+def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
+    path = write_atomic(tmp_path / "a.json", b"old")
+
+    def full_disk(handle):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(evaluate_files.os, "fsync", full_disk)
+    with pytest.raises(OSError, match="No space"):
+        write_atomic(path, b"new")
+    assert path.read_bytes() == b"old"
+    assert list(tmp_path.iterdir()) == [path]
+    monkeypatch.undo()
+    assert write_atomic(path, b"new").read_bytes() == b"new"

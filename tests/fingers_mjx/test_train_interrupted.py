@@ -1,0 +1,119 @@
+"""Runs that are killed or told to stop go on as if nothing had happened."""
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parent))
+
+import train_setup
+from train_setup import assert_same_end, curve, leaves, run
+
+from fingers_mjx import checkpoint
+from fingers_mjx.train_errors import Interrupted
+
+SCRIPT = Path(train_setup.__file__)
+
+
+def start(path, *words):
+    environment = os.environ | {"JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "3"}
+    command = [sys.executable, str(SCRIPT), str(path), *words]
+    return subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
+    )
+
+
+def read_until(process, event):
+    """Reads the events of a child until the first of a kind."""
+    for line in process.stdout:
+        if line.startswith(b"{") and json.loads(line)["event"] == event:
+            return json.loads(line)
+    raise AssertionError(process.stderr.read().decode()[-2000:])
+
+
+def test_killed_run_goes_on_bit_equal(tmp_path):
+    """SIGKILL at random times; the last checkpoint whose save was told is not lost."""
+    seed = random.randrange(10**6)
+    print(f"seed {seed}")
+    kill_and_compare(tmp_path, random.Random(seed), kills=2)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(10))
+def test_killed_run_goes_on_bit_equal_many_times(tmp_path, seed):
+    kill_and_compare(tmp_path, random.Random(seed), kills=10)
+
+
+def told_checkpoints(output):
+    """Returns the iterations of the saves told in whole lines of `output`."""
+    lines = [x for x in output.split(b"\n")[:-1] if x.startswith(b"{")]
+    events = [json.loads(line) for line in lines]
+    return [e["iteration"] for e in events if e["event"] == "checkpoint"]
+
+
+def kill_and_compare(tmp_path, rng, kills):
+    settings = {"iterations": 12 * kills, "checkpoint_every": 1}
+    words = [f"{k}={v}" for k, v in settings.items()]
+    path, told = tmp_path / "run", 0
+    for _ in range(kills):
+        resume = ["--resume"] if (path / "config.yaml").exists() else []
+        child = start(path, *resume, *words)
+        told = max(told, read_until(child, "checkpoint")["iteration"])
+        time.sleep(rng.uniform(0.0, 1.0))
+        child.send_signal(signal.SIGKILL)
+        told = max([told, *told_checkpoints(child.stdout.read())])
+        child.wait()
+        newest = checkpoint.newest(path / "checkpoints", print)
+        assert int(newest.name) >= told
+    run(path, resume=True, **settings)
+    assert not list((path / "checkpoints").glob(".*"))
+    run(tmp_path / "straight", iterations=12 * kills)
+    assert_same_end(tmp_path / "straight", path)
+    assert curve(path, "kl") == curve(tmp_path / "straight", "kl")
+
+
+@pytest.mark.parametrize(
+    "number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=pytest.mark.slow)]
+)
+def test_signal_saves_and_stops_with_75(tmp_path, number):
+    child = start(tmp_path / "run", "iterations=100000", "checkpoint_every=100")
+    read_until(child, "progress")
+    child.send_signal(number)
+    sent_s = time.monotonic()
+    assert child.wait(20.0) == 75
+    assert time.monotonic() - sent_s < 12.0
+    at, _ = leaves(tmp_path / "run")
+    run(tmp_path / "run", resume=True, iterations=at + 2)
+    run(tmp_path / "other", iterations=at + 2, checkpoint_every=at + 2)
+    assert_same_end(tmp_path / "run", tmp_path / "other")
+
+
+def test_signal_inside_is_told_by_the_checkpoint(tmp_path):
+    def interrupt(event):
+        if event["event"] == "progress" and event["iteration"] == 3:
+            os.kill(os.getpid(), signal.SIGINT)
+            time.sleep(0.2)
+
+    with pytest.raises(Interrupted, match="--resume") as error:
+        run(tmp_path / "run", on_progress=interrupt)
+    assert error.value.iteration == 3
+    assert leaves(tmp_path / "run")[0] == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(5))
+def test_resume_is_bit_equal_for_many_seeds(tmp_path, seed):
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    run(whole, iterations=20, seed=seed)
+    run(parts, iterations=10, seed=seed)
+    child = start(parts, "--resume", "iterations=20", f"seed={seed}")
+    child.communicate(timeout=300)
+    assert child.returncode == 0
+    assert_same_end(whole, parts)

@@ -1,0 +1,90 @@
+"""A tiny run on a probe, for the tests of the driver; run as a script, it trains.
+
+python train_setup.py RUN_DIR [--resume] [iterations=40 checkpoint_every=1 …]
+"""
+
+import dataclasses
+import json
+import os
+import sys
+from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+from probe_envs import probe
+
+from fingers_mjx import checkpoint
+from fingers_mjx.ppo_config import PpoConfig, TrainConfig
+from fingers_mjx.rundir_metrics import read_metrics
+from fingers_mjx.train import train
+from fingers_mjx.train_errors import Interrupted
+
+ROOT = Path(__file__).parents[2]
+os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))
+
+PPO = PpoConfig(
+    unroll_length=4,
+    epochs=2,
+    minibatches=2,
+    init_noise_std=0.5,
+    actor_layers=(8,),
+    critic_layers=(8,),
+)
+CONFIG = TrainConfig(
+    task="probe",
+    preset="cpu",
+    num_envs=16,
+    iterations=10,
+    log_every=1,
+    checkpoint_every=2,
+    ppo=PPO,
+)
+
+
+def make_env(num_envs):
+    return probe("seen_action", num_envs, length=3)
+
+
+def config(**changes):
+    """Returns CONFIG with changes; "ppo" takes a dict of changes to the learner."""
+    ppo = dataclasses.replace(PPO, **changes.pop("ppo", {}))
+    return dataclasses.replace(CONFIG, ppo=ppo, **changes)
+
+
+def run(path, resume=False, on_progress=lambda event: None, **changes):
+    """Trains a probe at `path`; keywords change CONFIG."""
+    return train(
+        make_env, config(**changes), path, resume=resume, on_progress=on_progress
+    )
+
+
+def leaves(path):
+    """Returns every array of the newest checkpoint, by name."""
+    newest = checkpoint.newest(path / "checkpoints", print)
+    return int(newest.name), checkpoint.load(newest).arrays
+
+
+def assert_same_end(path, other):
+    (iteration, one), (iteration_2, two) = leaves(path), leaves(other)
+    assert iteration == iteration_2
+    assert one.keys() == two.keys()
+    differing = [k for k in one if one[k].tobytes() != two[k].tobytes()]
+    assert differing == []
+
+
+def curve(path, *figures):
+    rows = read_metrics(path / "metrics.jsonl")
+    return [[row[name] for name in ("iteration", *figures)] for row in rows]
+
+
+def tell(event):
+    print(json.dumps(event), flush=True)
+
+
+if __name__ == "__main__":
+    given = dict(word.split("=") for word in sys.argv[2:] if "=" in word)
+    numbers = {name: int(value) for name, value in given.items()}
+    try:
+        run(Path(sys.argv[1]), "--resume" in sys.argv, tell, **numbers)
+    except Interrupted as stopped:
+        sys.exit(stopped.exit_code)
