@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import jax
 import numpy as np
@@ -17,6 +17,25 @@ from fingers_mjx.ppo_state import TrainState
 
 _POLICY = "train/params/policy/params/"
 _NORMALIZER = "train/normalizer/"
+
+
+class Network(Protocol):
+    """Normalizer and dense layers, wherever they come from."""
+
+    @property
+    def mean(self) -> Float[np.ndarray, " n"]:
+        """Mean of each observation."""
+        ...
+
+    @property
+    def std(self) -> Float[np.ndarray, " n"]:
+        """Standard deviation of each observation."""
+        ...
+
+    @property
+    def layers(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+        """Kernel [in, out] and bias [out] of each layer."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -58,7 +77,7 @@ def load_policy(path: Path) -> Policy:
     )
 
 
-def act(policy: Policy, obs: Float[Array, "*b n"]) -> Float[Array, "*b a"]:
+def act(policy: Network, obs: Float[Array, "*b n"]) -> Float[Array, "*b a"]:
     """Returns the mean action, neither clipped nor squashed: the environment does that.
 
     a = W_k elu(… elu(W_0 (obs - mean)/std + b_0) …) + b_k

@@ -1,6 +1,7 @@
 """Run directory: one writer at a time, and what anything can be rebuilt from.
 
 config.yaml     resolved configuration
+hand.yaml       the hand
 run.json        what a resumed run must share, and the format of this directory
 versions.json   packages, Python, platform, commit (no host or user names)
 metrics.jsonl   learning curve; events.out.tfevents.0: the same for TensorBoard
@@ -21,11 +22,14 @@ from typing import Any, TypeVar
 
 from envs.config import dump_yaml, load_yaml
 from envs.errors import InputError
+from envs.hand.hand_file import HandFile, hand_yaml
 from fingers_mjx.rundir_files import write_whole
 
 T = TypeVar("T")
 FORMAT = 1
 LOCK = "run.lock"
+CONFIG_FILE = "config.yaml"
+HAND_FILE = "hand.yaml"
 PACKAGES = (
     "fingers-mjx",
     "jax",
@@ -62,12 +66,19 @@ def open_run(path: Path, resume: bool) -> Iterator[Path]:
         yield path
 
 
-def record_run(path: Path, config: Mapping[str, Any], bound: Mapping[str, Any]) -> None:
-    """Writes configuration, versions and what a resumed run must share."""
+def record_run(
+    path: Path,
+    config: Mapping[str, Any],
+    bound: Mapping[str, Any],
+    hand: HandFile | None = None,
+) -> None:
+    """Writes configuration, hand, versions and what a resumed run must share."""
     text = dump_yaml(config)
+    if hand is not None:
+        write_whole(path / HAND_FILE, hand_yaml(hand).encode())
     write_whole(path / "versions.json", _json(versions()))
     write_whole(path / "run.json", _json({"format": FORMAT, "bound": bound}))
-    write_whole(path / "config.yaml", text.encode())
+    write_whole(path / CONFIG_FILE, text.encode())
 
 
 def saved_config(path: Path, cls: type[T]) -> T:
@@ -81,7 +92,7 @@ def saved_config(path: Path, cls: type[T]) -> T:
         InputError: if `path` is not a run directory that this version can read.
     """
     _read_run(path)
-    return load_yaml(cls, path / "config.yaml")
+    return load_yaml(cls, path / CONFIG_FILE)
 
 
 def check_bound(path: Path, current: Mapping[str, Any]) -> None:
@@ -120,9 +131,10 @@ def _check_purpose(path: Path, resume: bool) -> None:
         return
     if path.exists() and not path.is_dir():
         raise InputError(path, "", "a file", "a directory to make")
-    ours = {LOCK, "checkpoints", "eval", "versions.json", "run.json"}
+    files = {HAND_FILE, "versions.json", "run.json"}
+    ours = {LOCK, "checkpoints", "eval", *files, *(f".{n}.tmp" for n in files)}
     names = {p.name for p in path.iterdir()} if path.exists() else set()
-    if names - ours - {f".{n}.tmp" for n in ("versions.json", "run.json")}:
+    if names - ours:
         valid = "a new or empty directory (--resume goes on with a run)"
         raise InputError(path, "", "a directory in use", valid)
 
@@ -131,7 +143,7 @@ def _read_run(path: Path) -> dict[str, Any]:
     """Returns `run.json` of a complete run directory of this format."""
     try:
         run = json.loads((path / "run.json").read_text(encoding="utf-8"))
-        complete = (path / "config.yaml").exists()
+        complete = (path / CONFIG_FILE).exists()
     except (OSError, ValueError):
         run, complete = {}, False
     if not (complete and isinstance(run, dict)):

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from envs.errors import InputError
+from envs.hand.hand_file import HandFile
 from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
@@ -48,6 +49,7 @@ def train(
     run_dir: Path,
     *,
     env_config: Any = None,
+    hand: HandFile | None = None,
     resume: bool = False,
     warm_start: Path | None = None,
     identity: Mapping[str, Any] | None = None,
@@ -61,6 +63,7 @@ def train(
         run_dir: new or empty directory, or with `resume` that of the run.
         env_config: configuration of the environment, a dataclass or mapping; written
             beside `config`, and a resumed run must share it.
+        hand: written beside both.
         resume: go on from the newest intact checkpoint.
         warm_start: run directory or checkpoint whose policy, critic and normalizer the
             new run starts from; everything else starts afresh.
@@ -95,7 +98,7 @@ def train(
         session = Session(env, config)
         newest = _newest(path, say) if resume else None
         start = _restored(session, newest) if newest else _fresh(session, warm_start)
-        record_run(path, {"train": config, "env": env_config}, shared)
+        record_run(path, {"train": config, "env": env_config}, shared, hand)
         with MetricsLog(path, start[1]) as log:
             desk = Desk(path, shared, log, on_progress, stop, watchdog, ticker)
             saved = Loop(session, desk, *start, saved=newest).run()

@@ -150,6 +150,11 @@ def load_hand_file(path: str | Path = DEFAULT_HAND_FILE) -> HandFile:
     return load_yaml(HandFile, path)
 
 
+def hand_yaml(hand: HandFile) -> str:
+    """Returns the contents of a hand model file that reads back to `hand`."""
+    return dump_yaml(_without_empty(to_dict(hand)))
+
+
 def save_hand_file(hand: HandFile, path: str | Path) -> None:
     """Writes a hand model file that `load_hand_file` reads back exactly.
 
@@ -158,7 +163,7 @@ def save_hand_file(hand: HandFile, path: str | Path) -> None:
     target = Path(path)
     part = target.with_name(f".{target.name}.{os.getpid()}")
     try:
-        part.write_text(dump_yaml(_without_empty(to_dict(hand))), encoding="utf-8")
+        part.write_text(hand_yaml(hand), encoding="utf-8")
         os.replace(part, target)
     finally:
         part.unlink(missing_ok=True)
