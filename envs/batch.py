@@ -12,10 +12,25 @@ from envs.base import State
 class Env(Protocol):
     """One world of a task."""
 
-    action_size: int
-    observation_size: dict[str, int]
-    dt: float
-    episode_length: int
+    @property
+    def action_size(self) -> int:
+        """Joints that the policy commands."""
+        ...
+
+    @property
+    def observation_size(self) -> dict[str, int]:
+        """Entries of each observation by name."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Control interval [s]."""
+        ...
+
+    @property
+    def episode_length(self) -> int:
+        """Control steps of an episode that no failure ends."""
+        ...
 
     def reset(self, key: Array) -> State:
         """Begins a new world."""

@@ -68,4 +68,5 @@ def make_batch(
     return BatchEnv(env, num_envs, auto_reset)
 
 
-register("crawl", Task(CrawlConfig, CrawlEnv))
+# Type checkers do not take a cached_property for a property.
+register("crawl", Task(CrawlConfig, CrawlEnv))  # pyright: ignore[reportArgumentType]

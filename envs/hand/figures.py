@@ -82,11 +82,15 @@ def _link(raw: dict) -> Link:
     capsule = raw.get("collision", {}).get("capsule")
     ends = capsule and tuple(map(float, capsule["fromto"]))
     return Link(
-        **{k: raw[k] for k in ("body", "joint", "armature", "mass")},
-        **{
-            k: tuple(raw[k])
-            for k in ("pos", "quat", "inertial_pos", "inertial_quat", "diaginertia")
-        },
+        body=raw["body"],
+        joint=raw["joint"],
+        armature=raw["armature"],
+        mass=raw["mass"],
+        pos=tuple(raw["pos"]),
+        quat=tuple(raw["quat"]),
+        inertial_pos=tuple(raw["inertial_pos"]),
+        inertial_quat=tuple(raw["inertial_quat"]),
+        diaginertia=tuple(raw["diaginertia"]),
         range_rad=tuple(raw["range"]),
         kp=raw["drive"]["kp"],
         kv=raw["drive"]["kv"],
@@ -108,7 +112,7 @@ def _palm(raw: dict) -> Palm:
 @cache
 def figures() -> Figures:
     """Reads `figures.json` beside this file."""
-    raw = json.loads(files(__package__).joinpath("figures.json").read_text("utf-8"))
+    raw = json.loads(files("envs.hand").joinpath("figures.json").read_text("utf-8"))
     return Figures(
         palm=_palm(raw["palm"]),
         links=tuple(_link(link) for f in raw["fingers"] for link in f["links"]),

@@ -53,7 +53,7 @@ class Stance:
 @cache
 def load_stance() -> Stance:
     """Reads `stance.json` beside this file."""
-    raw = json.loads(files(__package__).joinpath("stance.json").read_text("utf-8"))
+    raw = json.loads(files("envs.hand").joinpath("stance.json").read_text("utf-8"))
     lists = {k: tuple(v) for k, v in raw.items() if isinstance(v, list)}
     lists["footprint_v"] = tuple(tuple(tip) for tip in raw["footprint_v"])
     return Stance(**(raw | lists))

@@ -196,7 +196,7 @@ class StanceProblem:
 def support_margins(
     point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "5 2"]
 ) -> Float[np.ndarray, "5"]:
-    """Signed distances [m] of a point to the edges of the footprint, inside positive."""
+    """Signed distances [m] of a point to the footprint's edges, inside positive."""
     start = tips[_HULL]
     edge = np.roll(start, -1, axis=0) - start
     area = np.sum(start[:, 0] * np.roll(start[:, 1], -1))

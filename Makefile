@@ -1,0 +1,54 @@
+# Every target sets up what it needs. Python 3.11, git and make are enough: uv, which
+# installs the locked dependencies, is put into .uv/ where it is missing.
+
+UV := $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
+RUN := $(UV) run --no-sync
+QUICK := tests/test_layers.py tests/rewards deploy/tests
+
+.DEFAULT_GOAL := help
+.PHONY: help sync format check test test-slow test-gpu demo bench build clean
+
+help: ## List the targets
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "%-10s %s\n", $$1, $$2}'
+
+sync: $(filter .uv/bin/uv,$(UV)) ## Install the locked dependencies into .venv/
+	@$(UV) sync --locked --inexact --quiet
+
+format: sync ## Rewrite the code in the project's style
+	$(RUN) ruff check --fix .
+	$(RUN) ruff format .
+
+check: sync ## What CI runs first: style, types, quick tests; changes nothing
+	$(RUN) ruff format --check .
+	$(RUN) ruff check .
+	$(RUN) pyright
+	$(RUN) pytest -q $(QUICK)
+
+test: sync ## All tests for two CPU cores
+	$(RUN) pytest
+
+test-slow: sync ## The large versions of the tests; they print their seeds
+	$(RUN) pytest -m slow
+
+test-gpu: sync ## The tests that need an NVIDIA GPU
+	$(UV) sync --locked --inexact --quiet --extra warp
+	$(RUN) pytest -m gpu
+
+demo: sync ## The walking hand: evaluate, play, train, export, one report
+	$(RUN) fingers demo
+
+bench: sync ## Speed of physics, environment and PPO on this machine
+	$(RUN) python benchmarks/throughput.py
+
+build: sync ## Wheels, and the quick tests against them in an environment of their own
+	rm -rf dist
+	$(UV) build --quiet --all-packages --wheel
+
+clean: ## Remove caches and builds; runs and the environment stay
+	rm -rf .pytest_cache .ruff_cache .hypothesis .jax_cache build dist deploy/build
+	find . -name __pycache__ -not -path './.venv/*' -prune -exec rm -rf {} +
+
+.uv/bin/uv:
+	@echo "uv is not installed; putting it into .uv/"
+	@python3 -m venv .uv || { echo "python3 -m venv failed: install uv or Python's venv module"; exit 1; }
+	@.uv/bin/python -m pip install --quiet 'uv>=0.8'
