@@ -300,12 +300,14 @@ def test_a_link_to_a_model_is_judged_by_the_folder_of_the_model(tmp_path):
 
 
 def test_compilation_has_a_time_limit(tmp_path):
-    """The hull of 60,000 points on a sphere takes seconds."""
+    """The hulls of 60,000 points on a sphere take a second or more each."""
     points = np.random.default_rng(SEED).normal(size=(60_000, 3))
     points /= np.linalg.norm(points, axis=1, keepdims=True)
     vertices = " ".join(f"{number:.5f}" for number in points.ravel())
-    text = with_asset(f'<mesh name="m" vertex="{vertices}"/>')
-    path = write(tmp_path, in_world('<geom type="mesh" mesh="m"/>', text))
+    names = "abcde"
+    meshes = "".join(f'<mesh name="{n}" vertex="{vertices}"/>' for n in names)
+    geoms = "".join(f'<geom type="mesh" mesh="{n}"/>' for n in names)
+    path = write(tmp_path, in_world(geoms, with_asset(meshes)))
     with pytest.raises(InputError, match="within 1 s of processor time"):
         load_custom_hand(path, cpu_limit_s=1)
 
