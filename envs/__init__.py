@@ -1,1 +1,1 @@
-"""TODO."""
+"""Environments of the hand: model and drive, physics, signals, tasks and registry."""

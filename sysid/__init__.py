@@ -1,1 +1,1 @@
-"""TODO."""
+"""System identification: from measured logs of a hand to its hand model file."""

@@ -1,1 +1,1 @@
-"""Hand."""
+"""The hand: its figures, model file, MuJoCo model, drive and stance."""

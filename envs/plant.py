@@ -1,0 +1,138 @@
+"""The hand in its physics: drive, varied model, and one control step of one world."""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Array, Bool, Float
+
+from envs.hand.drive import DriveParams, DriveState, command_sequence, drive_params
+from envs.hand.figures import figures
+from envs.hand.hand_file import HandFile
+from envs.hand.model import PHYSICS_DT_S
+from envs.hand.spec import HandSpec, hand_spec
+from envs.hand.stance import Stance
+from envs.physics import Physics, PhysicsOutput, PhysicsState, make_physics
+from envs.randomize import Variation, model_fields
+
+
+@dataclass(frozen=True)
+class Plant:
+    """What an action meets on its way to the next state.
+
+    Attributes:
+        mj_model: the scene with the nominal hand.
+        spec: indices of the model.
+        joint_range: limits of the joints and of their targets [rad].
+        physics: backend that steps it.
+        drive: parameters of the command path.
+        stance: settled stance of the hand.
+        rest: the stance with the sensors that belong to it.
+    """
+
+    mj_model: mujoco.MjModel
+    spec: HandSpec
+    joint_range: Float[Array, "20 2"]
+    physics: Physics
+    drive: DriveParams
+    stance: Stance
+    rest: PhysicsOutput
+
+    def next_target(
+        self,
+        target: Float[Array, "20"],
+        action: Float[Array, "20"],
+        scale_rad: float,
+    ) -> Float[Array, "20"]:
+        """Target ← clip(target + α tanh(a), joint limits) [rad].
+
+        Args:
+            target: joint targets before [rad].
+            action: clipped policy output a.
+            scale_rad: α, the increment at full action [rad].
+
+        Source:
+            Paper, policy interfaces.
+        """
+        moved = target + scale_rad * jnp.tanh(action)
+        return jnp.clip(moved, self.joint_range[:, 0], self.joint_range[:, 1])
+
+    def step(
+        self,
+        variation: Variation,
+        state: PhysicsState,
+        drive: DriveState,
+        target: Float[Array, "20"],
+    ) -> tuple[DriveState, PhysicsOutput, Bool[Array, ""]]:
+        """Advances one control step with the joint targets held.
+
+        Returns:
+            The drive's state, the result, and whether the step was invalid; see
+            `replace_invalid`.
+        """
+        drive, commands = command_sequence(
+            self.drive, drive, target, PHYSICS_DT_S, self.physics.n_substeps
+        )
+        fields = model_fields(self.mj_model, self.spec, variation)
+        output = self.physics.step(fields, state, commands)
+        return drive, *self.replace_invalid(output)
+
+    def replace_invalid(
+        self, output: PhysicsOutput
+    ) -> tuple[PhysicsOutput, Bool[Array, ""]]:
+        """Puts the stance in the place of a non-finite result, which ends the episode.
+
+        The step counts as invalid and pays nothing; nothing that it computed is used.
+        """
+        leaves = jax.tree.leaves((output.state, output.sensordata))
+        finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(x)) for x in leaves]))
+        rest = self.rest.replace(overflow=output.overflow)
+        return jax.tree.map(lambda a, b: jnp.where(finite, a, b), output, rest), ~finite
+
+
+def make_plant(
+    mj_model: mujoco.MjModel,
+    hand: HandFile,
+    stance: Stance,
+    control_dt_s: float,
+    backend: str,
+    num_worlds: int,
+) -> Plant:
+    """Makes the plant of a scene.
+
+    Args:
+        mj_model: the scene, with the hand built from the same file and stance.
+        hand: the hand file.
+        stance: settled stance of that hand.
+        control_dt_s: control interval [s].
+        backend: physics backend, see `envs.physics`.
+        num_worlds: most worlds that are stepped together.
+
+    Raises:
+        InputError: unknown backend, or one that cannot step this model.
+    """
+    substeps = round(control_dt_s / PHYSICS_DT_S)
+    kp, kv, limit = (figures().per_joint(k) for k in ("kp", "kv", "force_limit"))
+    drive = drive_params(hand, kp, kv, limit)
+    spec = hand_spec(mj_model)
+    return Plant(
+        mj_model=mj_model,
+        spec=spec,
+        joint_range=jnp.asarray(spec.joint_range_rad, jnp.float32),
+        physics=make_physics(backend, mj_model, substeps, num_worlds),
+        drive=jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), drive),
+        stance=stance,
+        rest=_output_at_rest(mj_model, stance),
+    )
+
+
+def _output_at_rest(model: mujoco.MjModel, stance: Stance) -> PhysicsOutput:
+    """The settled stance with the sensors that belong to it."""
+    data = mujoco.MjData(model)
+    data.qpos[:], data.ctrl[:] = stance.qpos, stance.target_rad
+    mujoco.mj_forward(model, data)
+    vectors = (data.qpos, np.zeros(model.nv), np.zeros(model.nv), data.sensordata)
+    *state, sensordata = (jnp.asarray(x, jnp.float32) for x in vectors)
+    return PhysicsOutput(PhysicsState(*state), sensordata, jnp.zeros((), jnp.int32))

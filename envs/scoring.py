@@ -1,0 +1,78 @@
+"""The reward of one world: its table's weights and their use in one step."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from envs.memory import Lasting
+from rewards import (
+    Constant,
+    GeometricDecay,
+    RewardTable,
+    Schedule,
+    StepSwitch,
+    evaluate,
+    table_weights,
+    weights_at,
+)
+
+
+def scheduled_weights(
+    table: RewardTable, values: Mapping[str, float], curriculum_scale: float
+) -> dict[str, Schedule]:
+    """Weights of a table with other values and another pace.
+
+    Args:
+        table: reward table.
+        values: row name -> weight in the place of the one that a schedule starts, or
+            after a switch ends, with.
+        curriculum_scale: factor on the steps at which schedules change.
+    """
+    weights = table_weights(table, None)
+    for name, value in values.items():
+        weights = weights | {name: _with_value(weights[name], value)}
+    return {k: _with_time_scale(w, curriculum_scale) for k, w in weights.items()}
+
+
+def score(
+    table: RewardTable,
+    lasting: Lasting,
+    named: Mapping[str, Any],
+    dt_s: float,
+    valid: Bool[Array, ""],
+) -> tuple[Lasting, Float[Array, ""], dict[str, Float[Array, ""]]]:
+    """Evaluates the table with the weights of this step, and counts the step.
+
+    Args:
+        table: reward table.
+        lasting: the world's weights and the step that their schedules have come to.
+        named: signals and magnitudes by name.
+        dt_s: control interval [s].
+        valid: whether the step counts; an invalid one pays nothing.
+
+    Returns:
+        The world after the step, the reward and its terms.
+    """
+    weights = weights_at(lasting.weights, lasting.total_steps)
+    total, terms = evaluate(table, named, weights, dt_s)
+    lasting = lasting.replace(total_steps=lasting.total_steps + 1)
+    paid = jax.tree.map(lambda x: jnp.where(valid, x, 0.0), (total, terms))
+    return lasting, *paid
+
+
+def _with_value(schedule: Schedule, value: float) -> Schedule:
+    """Replaces the weight that a schedule starts, or after a switch ends, with."""
+    field_name = {Constant: "value", StepSwitch: "after", GeometricDecay: "start"}
+    return schedule.replace(
+        **{field_name[type(schedule)]: jnp.asarray(value, jnp.float32)}
+    )
+
+
+def _with_time_scale(schedule: Schedule, scale: float) -> Schedule:
+    """Stretches the steps at which a schedule changes."""
+    steps = ("at_steps", "hold_steps", "decay_steps")
+    stretched = {k: v * scale for k, v in vars(schedule).items() if k in steps}
+    return schedule.replace(**stretched)
