@@ -1,5 +1,6 @@
 """What must hold between the fields of a manifest for this package to honour it."""
 
+import math
 import re
 from typing import Any
 
@@ -28,6 +29,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _VERSION = re.compile(r"[A-Za-z0-9.+_-]{1,64}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
 _MAX_HISTORY = 1000
+_UNIT_TOLERANCE = 1e-4
 _ROUNDING_RAD = 1e-6  # a target clipped in float32 may lie this far outside
 
 
@@ -48,6 +50,7 @@ def parse_manifest(text: str | bytes, source: object) -> Manifest:
     _check_joints(manifest.interface, problem)
     _check_terms(manifest.interface, problem)
     _check_rates(manifest.interface, problem)
+    _check_frame(manifest.interface, problem)
     _check_sizes(manifest, problem)
     _check_provenance(manifest, problem)
     return manifest
@@ -170,6 +173,13 @@ def _check_rates(interface: Interface, problem: _Problems) -> None:
     problem.unless(delay >= 0, "interface.command_path.delay_s", delay, "0 or more")
     field = "interface.action.transform"
     problem.unless(transform == ACTION_TRANSFORM, field, transform, ACTION_TRANSFORM)
+
+
+def _check_frame(interface: Interface, problem: _Problems) -> None:
+    norm = math.hypot(*interface.v_quat_b)
+    holds = abs(norm - 1.0) <= _UNIT_TOLERANCE
+    field = "interface.v_quat_b"
+    problem.unless(holds, field, f"norm {norm:.6g}", "a unit quaternion")
 
 
 def _check_sizes(manifest: Manifest, problem: _Problems) -> None:

@@ -1,8 +1,8 @@
-"""The one error of this package: a bundle that cannot be honoured."""
+"""The errors of this package: input that is refused, told in one sentence."""
 
 
-class BundleError(ValueError):
-    """A policy bundle is refused, told in one sentence.
+class InputError(ValueError):
+    """A file, an argument or a device is refused, told in one sentence.
 
     Args:
         source: the file or argument in which the value stands.
@@ -16,6 +16,10 @@ class BundleError(ValueError):
         self.source, self.field, self.found, self.valid = source, field, found, valid
         where = f"{source}: {field}" if field else f"{source}"
         super().__init__(f"{where}: found {_short(found)}; valid: {valid}")
+
+
+class BundleError(InputError):
+    """A policy bundle that cannot be honoured."""
 
 
 def _short(value: object, limit: int = 120) -> str:

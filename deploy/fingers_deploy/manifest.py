@@ -116,6 +116,8 @@ class Interface:
         action: what the output does.
         command_path: delay and filters of the targets in training.
         command_ranges: lowest and highest value of each command entry in training.
+        v_quat_b: orientation of the control frame V in the palm frame, unit quaternion
+            w x y z; V is level, x forward, in the nominal stance.
     """
 
     joint_names: tuple[str, ...]
@@ -127,6 +129,7 @@ class Interface:
     action: Action
     command_path: CommandPath
     command_ranges: tuple[tuple[float, float], ...]
+    v_quat_b: tuple[float, float, float, float]
 
 
 @dataclass(frozen=True)

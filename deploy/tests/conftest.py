@@ -43,6 +43,7 @@ def make_interface() -> Interface:
         action=Action(scale_rad=0.06, clip=3.0),
         command_path=CommandPath(delay_s=0.02, lowpass_hz=3.0, slew_rad_s=None),
         command_ranges=((0.0, 0.16), (-0.16, 0.16), (-0.45, 0.45)),
+        v_quat_b=(0.8, 0.0, -0.6, 0.0),
     )
 
 

@@ -156,6 +156,8 @@ MALFORMED = [
     ((I, "command_path", "slew_rad_s"), -1),
     ((I, "command_ranges"), [[0, 1]]),
     ((I, "command_ranges", 0), [1, 0]),
+    ((I, "v_quat_b"), [1.0, 1.0, 0.0, 0.0]),
+    ((I, "v_quat_b"), [1.0, 0.0, 0.0]),
     (("provenance", "config_sha256"), ""),
     (("provenance", "normalizer", "count"), -1),
     (("provenance", "normalizer", "steps"), 10**30),

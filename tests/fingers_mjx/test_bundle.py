@@ -33,6 +33,7 @@ INTERFACE = Interface(
     action=Action(scale_rad=0.06, clip=3.0),
     command_path=CommandPath(0.02, 3.0, None),
     command_ranges=(),
+    v_quat_b=(1.0, 0.0, 0.0, 0.0),
 )
 PROVENANCE = Provenance("0" * 64, Normalizer(1, 2), None, {"jax": "0.9.2"})
 

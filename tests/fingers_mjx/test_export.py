@@ -44,6 +44,7 @@ INTERFACE = Interface(
     action=Action(scale_rad=0.06, clip=3.0),
     command_path=CommandPath(0.02, 3.0, None),
     command_ranges=((0.0, 0.16), (-0.16, 0.16), (-0.45, 0.45)),
+    v_quat_b=(1.0, 0.0, 0.0, 0.0),
 )
 PROVENANCE = Provenance("0" * 64, Normalizer(1, 2), None, {"jax": "0.9.2"})
 SIZES = {"state": (392,), "privileged_state": (437,)}
