@@ -22,10 +22,10 @@ check: sync ## What CI runs first: style, types, quick tests; changes nothing
 	$(RUN) ruff format --check .
 	$(RUN) ruff check .
 	$(RUN) pyright
-	$(RUN) pytest -q $(QUICK)
+	$(RUN) pytest -q -n 2 $(QUICK)
 
 test: sync ## All tests for two CPU cores
-	$(RUN) pytest
+	$(RUN) pytest -n 2 --dist loadfile
 
 test-slow: sync ## The large versions of the tests; they print their seeds
 	$(RUN) pytest -m slow
