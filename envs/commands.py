@@ -6,6 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
+from envs.errors import check_ordered
 from envs.streams import stream
 
 
@@ -32,6 +33,9 @@ class CommandConfig:
     standing_fraction: float = field(
         default=0.05, metadata={"unit": "1", "low": 0.0, "high": 1.0}
     )
+
+    def __post_init__(self) -> None:
+        check_ordered(self, "vel_x_mps", "vel_y_mps", "yaw_rate_rps")
 
 
 def sample_command(key: Array, config: CommandConfig) -> Float[Array, "3"]:

@@ -9,13 +9,15 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from envs.commands import CommandConfig, sample_command
+from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.hand_env import HandEnv
 from envs.memory import Memory
 from envs.physics import PhysicsState
-from envs.plant import Plant
+from envs.plant import Plant, check_interval
 from envs.randomize import RandomizeConfig
+from envs.scoring import check_weights
 from envs.signals import Signals
 from envs.start import near_stance
 from envs.streams import stream
@@ -63,6 +65,13 @@ class CrawlConfig:
     weights: dict[str, float] = field(default_factory=dict)
     command: CommandConfig = field(default_factory=CommandConfig)
     randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
+
+    def __post_init__(self) -> None:
+        check_interval(self.control_dt_s)
+        check_weights(CRAWL, self.weights)
+        if self.command.resample_s < self.control_dt_s:
+            found, valid = self.command.resample_s, f">= {self.control_dt_s:g} s"
+            raise InputError("configuration", "command.resample_s", found, valid)
 
 
 @dataclass(frozen=True)

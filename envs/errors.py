@@ -33,3 +33,16 @@ def one_of(names: Iterable[str], found: str = "") -> str:
     near = difflib.get_close_matches(found, listed, n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     return "one of " + ", ".join(listed) + hint
+
+
+def check_ordered(config: object, *names: str) -> None:
+    """Checks fields that are ranges (low, high).
+
+    Raises:
+        InputError: the low end of a range is above its high end.
+    """
+    for name in names:
+        low, high = getattr(config, name)
+        if low > high:
+            found, valid = f"[{low:g}, {high:g}]", "[low, high] with low <= high"
+            raise InputError("configuration", name, found, valid)

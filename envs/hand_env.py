@@ -1,6 +1,5 @@
 """One world of the hand under a task: reset, step and what happens between them."""
 
-from functools import cached_property
 from typing import Any
 
 import jax
@@ -14,7 +13,7 @@ from envs.hand.drive import init_drive_state
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S, build_model
 from envs.hand.spec import HandSpec
-from envs.hand.stance import Stance, load_stance
+from envs.hand.stance import Stance, stance_of
 from envs.hand_task import HandTask
 from envs.memory import Lasting, Memory
 from envs.observations import Sample, flatten, push, start_history
@@ -36,7 +35,7 @@ class HandEnv:
         backend: physics backend, see `envs.physics`.
         num_worlds: most worlds that are stepped together.
         hand: hand file; the calibrated hand of the paper if not given.
-        stance: settled stance of that hand; the stored one if not given.
+        stance: settled stance of that hand; see `envs.hand.stance.stance_of`.
     """
 
     def __init__(
@@ -49,12 +48,14 @@ class HandEnv:
     ):
         self.task, self.config = task, task.config
         self.hand = hand or load_hand_file()
-        self.stance = stance or load_stance()
+        self.stance = stance or stance_of(self.hand)
         model = build_model(self.hand, np.array(self.stance.q_off))
         self.plant = make_plant(
             model, self.hand, self.stance, self.dt, backend, num_worlds
         )
         self._q_off = jnp.array(self.stance.q_off)
+        first = jax.eval_shape(self.reset, jax.random.key(0))
+        self._observation_size = {k: x.shape[-1] for k, x in first.obs.items()}
 
     @property
     def table(self) -> RewardTable:
@@ -91,11 +92,10 @@ class HandEnv:
         """Size of the policy output."""
         return self.mj_model.nu
 
-    @cached_property
+    @property
     def observation_size(self) -> dict[str, int]:
         """Sizes of the actor's and the critic's observation."""
-        state = jax.eval_shape(self.reset, jax.random.key(0))
-        return {name: x.shape[-1] for name, x in state.obs.items()}
+        return dict(self._observation_size)
 
     def reset(self, key: Array) -> State:
         """Begins a new world: its draw of the randomization and its first episode."""

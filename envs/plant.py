@@ -8,6 +8,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from envs.errors import InputError
 from envs.hand.drive import DriveParams, DriveState, command_sequence, drive_params
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
@@ -126,6 +127,18 @@ def make_plant(
         stance=stance,
         rest=_output_at_rest(mj_model, stance),
     )
+
+
+def check_interval(control_dt_s: float) -> None:
+    """Checks that a control interval is a whole number of physics steps.
+
+    Raises:
+        InputError: it is not, or is shorter than one.
+    """
+    substeps = control_dt_s / PHYSICS_DT_S
+    if round(substeps) < 1 or abs(substeps - round(substeps)) > 1e-6:
+        valid = f"a multiple of {PHYSICS_DT_S:g} s, the physics step"
+        raise InputError("configuration", "control_dt_s", control_dt_s, valid)
 
 
 def _output_at_rest(model: mujoco.MjModel, stance: Stance) -> PhysicsOutput:

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Float
 
+from envs.errors import check_ordered
 from envs.hand.spec import HandSpec
 from envs.physics import ModelFields
 from envs.streams import stream
@@ -21,7 +22,7 @@ from envs.streams import stream
 
 @dataclass(frozen=True)
 class RandomizeConfig:
-    """Ranges of the draws; `none()` gives the nominal hand.
+    """Ranges of the draws; `no_randomization` gives the nominal hand.
 
     Attributes:
         tip_friction: sliding friction of all fingertips.
@@ -37,19 +38,31 @@ class RandomizeConfig:
             sample (ours).
     """
 
-    tip_friction: tuple[float, float] = (0.30, 1.30)
-    gain_scale: tuple[float, float] = (0.78, 1.22)
-    effort_scale: tuple[float, float] = (1.0, 1.5)
+    tip_friction: tuple[float, float] = field(
+        default=(0.30, 1.30), metadata={"unit": "1", "low": 0.0}
+    )
+    gain_scale: tuple[float, float] = field(
+        default=(0.78, 1.22), metadata={"unit": "1", "low": 0.01}
+    )
+    effort_scale: tuple[float, float] = field(
+        default=(1.0, 1.5), metadata={"unit": "1", "low": 0.01}
+    )
     payload_com_m: tuple[float, float] = field(
         default=(0.010, 0.015), metadata={"unit": "m", "low": 0.0}
     )
-    palm_mass_scale: tuple[float, float] = (0.9, 1.1)
+    palm_mass_scale: tuple[float, float] = field(
+        default=(0.9, 1.1), metadata={"unit": "1", "low": 0.01}
+    )
     palm_com_m: float = field(default=0.005, metadata={"unit": "m", "low": 0.0})
     imu_tilt_rad: float = field(default=0.03, metadata={"unit": "rad", "low": 0.0})
     gyro_bias_rps: float = field(default=0.05, metadata={"unit": "rad/s", "low": 0.0})
     joint_noise_rad: float = field(default=0.005, metadata={"unit": "rad", "low": 0.0})
     gravity_noise: float = field(default=0.01, metadata={"unit": "1", "low": 0.0})
     gyro_noise_rps: float = field(default=0.05, metadata={"unit": "rad/s", "low": 0.0})
+
+    def __post_init__(self) -> None:
+        ranges = ("tip_friction", "gain_scale", "effort_scale", "palm_mass_scale")
+        check_ordered(self, *ranges)
 
 
 def no_randomization(tip_friction: float) -> RandomizeConfig:

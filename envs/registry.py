@@ -68,5 +68,4 @@ def make_batch(
     return BatchEnv(env, num_envs, auto_reset)
 
 
-# Type checkers do not take a cached_property for a property.
-register("crawl", Task(CrawlConfig, CrawlEnv))  # pyright: ignore[reportArgumentType]
+register("crawl", Task(CrawlConfig, CrawlEnv))

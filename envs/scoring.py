@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from envs.errors import InputError, one_of
 from envs.memory import Lasting
 from rewards import (
     Constant,
@@ -20,6 +21,19 @@ from rewards import (
 )
 
 
+def check_weights(table: RewardTable, values: Mapping[str, float]) -> None:
+    """Checks that weights are those of rows.
+
+    Raises:
+        InputError: there is no row of that name.
+    """
+    rows = [row.name for row in table]
+    for name in values:
+        if name not in rows:
+            valid = one_of(rows, name)
+            raise InputError("configuration", f"weights.{name}", name, valid)
+
+
 def scheduled_weights(
     table: RewardTable, values: Mapping[str, float], curriculum_scale: float
 ) -> dict[str, Schedule]:
@@ -30,7 +44,11 @@ def scheduled_weights(
         values: row name -> weight in the place of the one that a schedule starts, or
             after a switch ends, with.
         curriculum_scale: factor on the steps at which schedules change.
+
+    Raises:
+        InputError: there is no row of that name.
     """
+    check_weights(table, values)
     weights = table_weights(table, None)
     for name, value in values.items():
         weights = weights | {name: _with_value(weights[name], value)}

@@ -5,11 +5,11 @@ carries none), a box for the palm and one for the dorsal module. Everything that
 hands may differ in comes from the hand file.
 """
 
-import mujoco
 import numpy as np
 
 from envs.hand.figures import FINGERS, Link, figures
 from envs.hand.hand_file import HandFile
+from envs.quiet_mujoco import mujoco
 
 PHYSICS_DT_S = 0.005
 FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"

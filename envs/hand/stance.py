@@ -59,6 +59,21 @@ def load_stance() -> Stance:
     return Stance(**(raw | lists))
 
 
+def stance_of(hand: HandFile) -> Stance:
+    """The crawl stance of a hand: the stored one, settled anew for another hand.
+
+    The joint targets are the same; how deep a hand sinks under them depends on its
+    mass, stiffness and friction.
+
+    Raises:
+        InputError: the hand does not stand under these targets.
+    """
+    stored = load_stance()
+    if hand.sha256 == stored.hand_sha256:
+        return stored
+    return settle(hand, stored.qpos, np.array(stored.target_rad))
+
+
 def stance_json(stance: Stance) -> str:
     """The contents of `stance.json`."""
     return json.dumps(asdict(stance), indent=1) + "\n"

@@ -7,7 +7,6 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-import mujoco
 import numpy as np
 from jax.experimental.buffer_callback import buffer_callback
 from jaxtyping import Array, Float
@@ -21,6 +20,7 @@ from envs.physics.base import (
     check_model,
     nan_if_diverged,
 )
+from envs.quiet_mujoco import mujoco
 
 # C MuJoCo skips a frame that coincides with its body's, and MJX does not. So the
 # compiler's note that it coincides must go when the frame is given per world.
