@@ -58,6 +58,21 @@ class BatchEnv:
     def __getattr__(self, name: str) -> Any:
         return getattr(self.env, name)
 
+    @property
+    def action_size(self) -> int:
+        """Joints that the policy commands."""
+        return self.env.action_size
+
+    @property
+    def observation_size(self) -> dict[str, int]:
+        """Entries of each observation by name."""
+        return self.env.observation_size
+
+    @property
+    def dt(self) -> float:
+        """Control interval [s]."""
+        return self.env.dt
+
     def reset(self, key: Array) -> State:
         """Begins `num_envs` worlds, world i from the i-th split of the key."""
         return jax.vmap(self.env.reset)(jax.random.split(key, self.num_envs))

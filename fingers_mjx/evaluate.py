@@ -94,9 +94,20 @@ def evaluate(
         tell = _telling(progress, count // len(state.done) * steps, batches * steps)
         rollouts.append(_rollout(advance, state, steps, tell))
     traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :episodes], *rollouts)
-    return EpisodeTable(
-        _columns(traces, batch_env.dt, mass_kg), traces, float(batch_env.dt)
-    )
+    return episode_table(traces, float(batch_env.dt), mass_kg)
+
+
+def episode_table(traces: Trace, dt_s: float, mass_kg: float) -> EpisodeTable:
+    """Measures recorded episodes.
+
+    Args:
+        traces: NumPy arrays, axes time and episode first.
+        dt_s: control interval.
+        mass_kg: of the hand and what it carries.
+    """
+    found = _measures(traces, dt_s, mass_kg)
+    columns = {name: np.asarray(values, float) for name, values in found.items()}
+    return EpisodeTable(columns, traces, dt_s)
 
 
 def _advance(env: BatchEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:
@@ -126,11 +137,6 @@ def _telling(progress: Progress | None, before: int, total: int):
             progress(before + done, total)
 
     return tell
-
-
-def _columns(traces: Trace, dt_s: float, mass_kg: float) -> dict[str, np.ndarray]:
-    found = _measures(traces, float(dt_s), float(mass_kg))
-    return {name: np.asarray(values, float) for name, values in found.items()}
 
 
 @partial(jax.jit, static_argnames=("dt_s", "mass_kg"))

@@ -14,6 +14,8 @@ import pyarrow.parquet as pq
 from envs.errors import InputError
 from fingers_mjx.stats import Summary, summarize
 
+SUMMARY_FILE, TABLE_FILE = "summary.json", "episodes.parquet"
+
 
 def write_atomic(path: Path, content: bytes) -> Path:
     """Writes a whole file or leaves the old one: temporary file, sync, rename."""

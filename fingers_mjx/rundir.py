@@ -28,7 +28,9 @@ from fingers_mjx.rundir_files import write_whole
 T = TypeVar("T")
 FORMAT = 1
 LOCK = "run.lock"
+RUN_FILE = "run.json"
 CONFIG_FILE = "config.yaml"
+VERSIONS_FILE = "versions.json"
 HAND_FILE = "hand.yaml"
 PACKAGES = (
     "fingers-mjx",
@@ -76,8 +78,8 @@ def record_run(
     text = dump_yaml(config)
     if hand is not None:
         write_whole(path / HAND_FILE, hand_yaml(hand).encode())
-    write_whole(path / "versions.json", _json(versions()))
-    write_whole(path / "run.json", _json({"format": FORMAT, "bound": bound}))
+    write_whole(path / VERSIONS_FILE, _json(versions()))
+    write_whole(path / RUN_FILE, _json({"format": FORMAT, "bound": bound}))
     write_whole(path / CONFIG_FILE, text.encode())
 
 
@@ -93,6 +95,20 @@ def saved_config(path: Path, cls: type[T]) -> T:
     """
     _read_run(path)
     return load_yaml(cls, path / CONFIG_FILE)
+
+
+def saved_task(path: Path) -> str:
+    """Returns the name of the task that the run at `path` trains.
+
+    Raises:
+        InputError: if `path` is not a run directory that this version can read.
+    """
+    bound = _read_run(path).get("bound")
+    task = bound.get("train", {}).get("task") if isinstance(bound, dict) else None
+    if not isinstance(task, str):
+        valid = "the name of a task"
+        raise InputError(path / RUN_FILE, "bound.train.task", task, valid)
+    return task
 
 
 def check_bound(path: Path, current: Mapping[str, Any]) -> None:
@@ -131,7 +147,7 @@ def _check_purpose(path: Path, resume: bool) -> None:
         return
     if path.exists() and not path.is_dir():
         raise InputError(path, "", "a file", "a directory to make")
-    files = {HAND_FILE, "versions.json", "run.json"}
+    files = {HAND_FILE, VERSIONS_FILE, RUN_FILE}
     ours = {LOCK, "checkpoints", "eval", *files, *(f".{n}.tmp" for n in files)}
     names = {p.name for p in path.iterdir()} if path.exists() else set()
     if names - ours:
@@ -142,7 +158,7 @@ def _check_purpose(path: Path, resume: bool) -> None:
 def _read_run(path: Path) -> dict[str, Any]:
     """Returns `run.json` of a complete run directory of this format."""
     try:
-        run = json.loads((path / "run.json").read_text(encoding="utf-8"))
+        run = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
         complete = (path / CONFIG_FILE).exists()
     except (OSError, ValueError):
         run, complete = {}, False
@@ -150,7 +166,7 @@ def _read_run(path: Path) -> dict[str, Any]:
         raise InputError(path, "", "no run", "a directory made by fingers train")
     if run.get("format") != FORMAT:
         found = run.get("format", "nothing")
-        raise InputError(path / "run.json", "format", found, str(FORMAT))
+        raise InputError(path / RUN_FILE, "format", found, str(FORMAT))
     return run
 
 

@@ -1,0 +1,84 @@
+"""The command `fingers`: train, evaluate, export, play, show the hand, demonstrate.
+
+Exit status: 0 done; 2 bad input; 3 learning diverged; 4 no room on the disk; 75 stopped
+by a signal after a checkpoint, go on with --resume; 130 stopped by the keyboard.
+"""
+
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+
+from fingers_mjx.cli_parser import UsageError, make_parser
+
+BAD_INPUT, DISK_FULL, KEYBOARD = 2, 4, 130
+_EXTRAS = {
+    "matplotlib": "viz",
+    "imageio_ffmpeg": "viz",
+    "PIL": "viz",
+    "jinja2": "viz",
+    "pyarrow": "viz",
+}
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Runs one command and returns its exit status; errors are one sentence on stderr.
+
+    Args:
+        argv: arguments after the program's name; those of the process if not given.
+    """
+    # Nothing of JAX is imported before the command is known: --help answers at once.
+    os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    try:
+        args = make_parser().parse_args(argv)
+        # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
+        warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
+        importlib.import_module("envs.physics.quiet_mjx")
+        command = importlib.import_module(f"fingers_mjx.{args.module}")
+        return command.run(args)
+    except KeyboardInterrupt:
+        return _say("stopped", KEYBOARD)
+    except Exception as error:
+        status = _status(error)
+        if status is None:
+            raise
+        return _say(_sentence(error), status)
+
+
+def _status(error: Exception) -> int | None:
+    """Returns the exit status of an error that a user can meet, None for a fault."""
+    if isinstance(error, UsageError):
+        return BAD_INPUT
+    if isinstance(error, ModuleNotFoundError):
+        return BAD_INPUT if error.name in _EXTRAS else None
+    from envs.errors import InputError
+    from fingers_deploy import BundleError
+    from fingers_mjx.rundir_files import is_full
+
+    if (status := getattr(error, "exit_code", None)) is not None:
+        return status
+    if is_full(error):
+        return DISK_FULL
+    if isinstance(error, InputError | BundleError | OSError):
+        return BAD_INPUT
+    return None
+
+
+def _sentence(error: Exception) -> str:
+    """Returns what went wrong on one line."""
+    if isinstance(error, ModuleNotFoundError):
+        extra = _EXTRAS[str(error.name)]
+        return f'{error.name} is not installed; pip install "fingers-mjx[{extra}]"'
+    if isinstance(error, OSError) and error.filename:
+        return f"{error.filename}: {error.strerror}"
+    return " ".join(str(error).split())
+
+
+def _say(sentence: str, status: int) -> int:
+    print(f"fingers: {sentence}", file=sys.stderr)
+    return status
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,64 @@
+"""Progress of commands that count: one live line on a terminal, else JSON lines."""
+
+import json
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TextIO
+
+from fingers_mjx.progress import Event, Ticker
+
+LINE_EVERY_S = 5.0
+"""Time between two lines where they are kept [s]."""
+
+Count = Callable[[int, int], None]
+
+
+@contextmanager
+def counting(stream: TextIO, what: str, unit: str) -> Iterator[Count]:
+    """Yields a function to be told (done, in all); says "compiling" until then.
+
+    Args:
+        stream: where the lines go.
+        what: the activity, such as "evaluating".
+        unit: what is counted, such as "steps".
+    """
+    show = _Line(stream, what, unit)
+    with Ticker(show.compiling, 1.0) as ticker:
+
+        def count(done: int, total: int) -> None:
+            ticker.stop()
+            show.count(done, total)
+
+        yield count
+    show.end()
+
+
+class _Line:
+    """What has been said last, and when."""
+
+    def __init__(self, stream: TextIO, what: str, unit: str):
+        self._stream, self._what, self._unit = stream, what, unit
+        self._live = stream.isatty()
+        self._said_s = -LINE_EVERY_S
+
+    def compiling(self, event: Event) -> None:
+        elapsed_s = event["elapsed_s"]
+        self._say(f"{self._what}: compiling… {elapsed_s:.0f} s", event, False)
+
+    def count(self, done: int, total: int) -> None:
+        event = {"event": self._what, "done": done, "total": total, "unit": self._unit}
+        text = f"{self._what}: {done:,} of {total:,} {self._unit}"
+        self._say(text, event, done >= total)
+
+    def end(self) -> None:
+        if self._live:
+            print(file=self._stream, flush=True)
+
+    def _say(self, text: str, event: Event, last: bool) -> None:
+        now_s = time.monotonic()
+        if self._live:
+            print(f"\r\x1b[K{text}", end="", file=self._stream, flush=True)
+        elif last or now_s - self._said_s >= LINE_EVERY_S:
+            self._said_s = now_s
+            print(json.dumps(event), file=self._stream, flush=True)

@@ -1,0 +1,25 @@
+"""The measures of an evaluation as a table of text."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+
+def print_measures(summary: Mapping[str, Any]) -> None:
+    """Prints the measures of a summary with their 95 % intervals on stdout."""
+    title = f"{summary['policy']}: {summary['episodes']} episodes of {summary['task']}"
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    table.add_column("measure")
+    for name in ("mean", "95 % interval", "std", "n"):
+        table.add_column(name, justify="right")
+    for name, measure in summary["measures"].items():
+        interval = f"{_text(measure['low'])} – {_text(measure['high'])}"
+        figures = (_text(measure["mean"]), interval, _text(measure["std"]))
+        table.add_row(name, *figures, str(measure["n"]))
+    Console(soft_wrap=True, highlight=False).print(table)
+
+
+def _text(value: float | None) -> str:
+    return "undefined" if value is None else f"{value:.4g}"

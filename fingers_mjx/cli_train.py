@@ -1,0 +1,105 @@
+"""`fingers train`: a new run, or one to go on with."""
+
+import argparse
+import dataclasses
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+from envs.errors import InputError, one_of
+from envs.physics import BACKENDS, default_backend
+from envs.registry import get_task, task_names
+from fingers_mjx.ppo_config import TrainConfig, preset
+from fingers_mjx.progress import reporter
+from fingers_mjx.run_setup import (
+    Setup,
+    identity,
+    make_env,
+    new_setup,
+    overridden,
+    run_setup,
+)
+from fingers_mjx.train import train
+
+_FOR_NEW_RUNS = ("hand", "out", "warm_start")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Trains, and reports on stdout."""
+    resume = args.resume is not None
+    setup = _resumed(args) if resume else _new(args)
+    path = args.resume or args.out or _default_dir(setup.train)
+    # Made here for its identity, and handed over: nothing is built twice.
+    env = make_env(setup, setup.train.num_envs, setup.train.backend)
+    with reporter(sys.stdout) as show:
+        show({"event": "note", "text": _headline(setup, path)})
+        result = train(
+            lambda num_envs: env,
+            setup.train,
+            path,
+            env_config=setup.env,
+            hand=setup.hand,
+            resume=resume,
+            warm_start=args.warm_start,
+            identity=identity(env),
+            on_progress=show,
+        )
+        text = f"done after {result.iterations} iterations; next: fingers eval {path}"
+        show({"event": "note", "text": text})
+    return 0
+
+
+def _new(args: argparse.Namespace) -> Setup:
+    """Returns the settings of a new run."""
+    if args.task is None:
+        raise InputError("TASK", "", "", one_of(task_names()))
+    get_task(args.task)
+    backend = check_backend(args.backend or default_backend())
+    chosen = preset(args.preset or ("fast" if backend == "warp" else "cpu"))
+    given = {"task": args.task, "backend": backend}
+    if args.seed is not None:
+        given["seed"] = args.seed
+    train_config = dataclasses.replace(chosen, **given)
+    return overridden(new_setup(train_config, args.hand), args.settings)
+
+
+def _resumed(args: argparse.Namespace) -> Setup:
+    """Returns the saved settings; what may be changed in them, `--set` changes."""
+    for name in _FOR_NEW_RUNS:
+        if (found := getattr(args, name)) is not None:
+            option = f"--{name.replace('_', '-')}"
+            raise InputError(option, "", found, "only without --resume")
+    saved = run_setup(args.resume)
+    for name in ("task", "preset", "backend", "seed"):
+        found, was = getattr(args, name), getattr(saved.train, name)
+        if found not in (None, was):
+            raise InputError(args.resume, name, found, f"{was}, as saved")
+    return overridden(saved, args.settings)
+
+
+def check_backend(name: str) -> str:
+    """Returns `name`, the name of a physics backend.
+
+    Raises:
+        InputError: there is no such backend.
+    """
+    if name not in BACKENDS:
+        raise InputError("--backend", "", name, one_of(BACKENDS, name))
+    return name
+
+
+def _default_dir(config: TrainConfig) -> Path:
+    """Returns a directory of this second under `runs/`."""
+    now = time.strftime("%Y%m%d-%H%M%S")
+    return Path("runs") / f"{config.task}-{config.preset}-{config.seed}-{now}"
+
+
+def _headline(setup: Setup, path: Path) -> str:
+    train_config = setup.train
+    steps: Any = train_config.iterations * train_config.steps_per_iteration
+    return (
+        f"training {train_config.task} (preset {train_config.preset}, backend "
+        f"{train_config.backend}): {train_config.iterations} iterations, "
+        f"{steps / 1e6:.4g} M control steps, into {path}"
+    )

@@ -1,0 +1,182 @@
+"""Evaluation of a trained policy wherever it is kept, and what is written of it."""
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from matplotlib.figure import Figure
+
+from envs.errors import InputError
+from envs.randomize import no_randomization
+from fingers_mjx import figures
+from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.evaluate_files import (
+    SUMMARY_FILE,
+    TABLE_FILE,
+    summary_document,
+    write_summary,
+    write_table,
+)
+from fingers_mjx.measures import CONTACT_N
+from fingers_mjx.policy_source import PolicySource
+from fingers_mjx.ppo_policy import act
+from fingers_mjx.report import commit_here
+from fingers_mjx.run_setup import Setup, make_env
+
+MAX_WORLDS = 4096
+GAIT_S = 8.0
+"""Stretch of an episode that the gait diagram shows [s]."""
+
+
+def nominal(setup: Setup) -> Setup:
+    """Returns `setup` with the nominal hand, no noise and a start in the stance."""
+    calm = no_randomization(setup.hand.tip_friction.value)
+    env = dataclasses.replace(
+        setup.env, randomize=calm, reset_joint_rad=0.0, reset_speed_mps=0.0
+    )
+    return dataclasses.replace(setup, env=env)
+
+
+def with_command(setup: Setup, command: Sequence[float]) -> Setup:
+    """Returns `setup` with one command for all of every episode.
+
+    Args:
+        setup: settings.
+        command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
+    """
+    ranges = [(float(value), float(value)) for value in command]
+    fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
+    fixed = dict(zip(fields, ranges, strict=True))
+    changed = dataclasses.replace(setup.env.command, **fixed, standing_fraction=0.0)
+    env = dataclasses.replace(setup.env, command=changed)
+    return dataclasses.replace(setup, env=env)
+
+
+def evaluate_source(
+    source: PolicySource,
+    episodes: int,
+    seed: int = 0,
+    backend: str = "cpu",
+    steps: int | None = None,
+    progress: Progress | None = None,
+) -> EpisodeTable:
+    """Runs the deterministic policy in `episodes` randomized worlds of its task.
+
+    Args:
+        source: policy; its setup is what is simulated.
+        episodes: number of episodes, each in a world of its own.
+        seed: of worlds, commands and noise.
+        backend: physics backend.
+        steps: control steps of an episode; as in training if not given.
+        progress: told (steps done, steps in all).
+
+    Raises:
+        InputError: settings that do not fit.
+    """
+    setup = source.setup
+    if steps is not None:
+        length_s = steps * setup.env.control_dt_s
+        env = dataclasses.replace(setup.env, episode_s=length_s)
+        setup = dataclasses.replace(setup, env=env)
+    # What a fallen hand does does not count, so there is no need to set it up again.
+    batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
+    return evaluate(
+        batch,
+        lambda obs: act(source.network, obs["state"]),
+        episodes,
+        batch.episode_length,
+        jax.random.key(seed),
+        float(batch.mj_model.body_mass.sum()),
+        progress,
+    )
+
+
+def document(
+    source: PolicySource,
+    table: EpisodeTable,
+    seed: int,
+    conditions: Mapping[str, Any],
+) -> dict[str, Any]:
+    """Returns the summary of an evaluation for JSON.
+
+    Args:
+        source: policy.
+        table: its episodes.
+        seed: of the evaluation.
+        conditions: what else it takes to repeat it, as plain data.
+    """
+    about = summary_document(
+        table.columns,
+        source.setup.train.task,
+        str(source.path),
+        seed,
+        source.steps_trained,
+        commit_here(),
+    )
+    return {**about, "conditions": dict(conditions)}
+
+
+def write_evaluation(
+    directory: Path, table: EpisodeTable, summary: Mapping[str, Any]
+) -> None:
+    """Writes summary, table of episodes and figures.
+
+    Args:
+        directory: made if missing; other files in it are left alone.
+        table: the episodes.
+        summary: from `document`.
+    """
+    directory.mkdir(parents=True, exist_ok=True)
+    about = {k: str(v) for k, v in summary.items() if k != "measures"}
+    write_table(directory / TABLE_FILE, table.columns, about)
+    for name, figure in evaluation_figures(table).items():
+        figure.savefig(directory / f"{name}.png")
+    write_summary(directory / SUMMARY_FILE, summary)
+
+
+def evaluation_figures(table: EpisodeTable) -> dict[str, Figure]:
+    """Returns gait, foot paths and tracking; of single episodes the most typical."""
+    index = typical_episode(table)
+    trace = jax.tree.map(np.asarray, table.episode(index))
+    contact = trace.tip_force_n >= CONTACT_N
+    span = slice(round(GAIT_S / table.dt_s))
+    where = f"episode {index}"
+    return {
+        "gait": figures.gait_diagram(
+            contact[span], table.dt_s, f"Gait diagram, {where}"
+        ),
+        "feet": figures.foot_trajectories(trace.tip_pos_v[span], contact[span]),
+        "tracking": figures.tracking(table.columns),
+        "tracking_in_time": figures.tracking_in_time(
+            trace.command,
+            trace.vel_v,
+            trace.yaw_rate,
+            table.dt_s,
+            f"Velocity of {where} against its command",
+        ),
+    }
+
+
+def typical_episode(table: EpisodeTable) -> int:
+    """Returns the number of the longest episode with the median task speed."""
+    speed, length = (table.columns[k] for k in ("task_speed_mps", "duration_s"))
+    longest = np.flatnonzero(length >= length.max())
+    known = longest[np.isfinite(speed[longest])]
+    if not len(known):
+        return int(longest[0])
+    return int(known[np.argsort(speed[known], kind="stable")[len(known) // 2]])
+
+
+def check_policy_settings(assignments: Sequence[str]) -> None:
+    """Refuses settings of the learner, which an evaluation has no use for.
+
+    Raises:
+        InputError: naming the first one.
+    """
+    for text in assignments:
+        if not text.startswith("env."):
+            valid = "a setting of the task, env.FIELD=VALUE"
+            raise InputError("--set", "", text, valid)

@@ -1,0 +1,105 @@
+"""From a run directory to a bundle that can be evaluated and played anywhere."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import jax
+
+from envs.batch import BatchEnv
+from envs.errors import InputError
+from fingers_deploy.manifest import Normalizer, Provenance
+from fingers_mjx.checkpoint import Saved
+from fingers_mjx.evaluate_files import SUMMARY_FILE, write_atomic
+from fingers_mjx.export import (
+    Apply,
+    ExportReport,
+    brax_apply,
+    brax_weights,
+    export_policy,
+)
+from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.policy_interface import interface_of
+from fingers_mjx.ppo_policy import read
+from fingers_mjx.ppo_state import init_train_state, make_learner
+from fingers_mjx.run_setup import Setup, config_digest, make_env, run_setup
+from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
+
+
+def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
+    """Writes the policy of a run's newest checkpoint as a bundle.
+
+    Beside `policy.onnx` and `manifest.json` stand `config.yaml` and `hand.yaml`, from
+    which `fingers eval` and `fingers play` build the task again.
+
+    Args:
+        run_dir: run directory.
+        out_dir: made if missing; may be `run_dir` itself.
+
+    Raises:
+        InputError: no run directory of this version, or one without a checkpoint.
+        ExportError: the exported graph gives other actions than JAX.
+    """
+    setup, saved = run_setup(run_dir), read(run_dir)
+    env = make_env(setup, 1, "cpu")
+    weights, apply = _network(setup, saved, env)
+    report = export_policy(
+        out_dir,
+        weights,
+        apply,
+        setup.train.task,
+        interface_of(env),
+        _provenance(run_dir, saved),
+    )
+    for name in (CONFIG_FILE, HAND_FILE):
+        content = (run_dir / name).read_bytes()
+        if not (out_dir / name).exists() or (out_dir / name).read_bytes() != content:
+            write_atomic(out_dir / name, content)
+    return report
+
+
+def _network(setup: Setup, saved: Saved, env: BatchEnv) -> tuple[PolicyWeights, Apply]:
+    """Returns the actor's weights, and the actor as training ran it."""
+    learner = make_learner(env, setup.train.ppo)
+    empty = jax.eval_shape(
+        lambda key: init_train_state(learner, env, key), jax.random.key(0)
+    )
+    wanted = {"params": empty.params, "normalizer": empty.normalizer}
+    train = saved.part({"train": wanted})["train"]
+    actor, normalizer = train["params"].policy, train["normalizer"]
+    weights = brax_weights(actor, normalizer, setup.env.action_clip)
+    return weights, brax_apply(learner.networks.policy_network, normalizer, actor)
+
+
+def _provenance(run_dir: Path, saved: Saved) -> Provenance:
+    steps, count = saved.meta["env_steps"], saved.arrays
+    high, low = (int(count[f"train/normalizer/count/{x}"]) for x in ("hi", "lo"))
+    return Provenance(
+        config_sha256=config_digest(run_dir),
+        normalizer=Normalizer(steps=steps, count=(high << 32) + low),
+        evaluation=_evaluation(run_dir / "eval" / SUMMARY_FILE, steps),
+        versions=_versions(run_dir / VERSIONS_FILE),
+    )
+
+
+def _evaluation(path: Path, steps: int) -> dict[str, float] | None:
+    """Returns the means of the run's last evaluation, if it is of this checkpoint."""
+    if not path.exists():
+        return None
+    summary = _json(path)
+    if summary.get("steps_trained") != steps:
+        return None
+    means = {name: m["mean"] for name, m in summary["measures"].items()}
+    return {name: mean for name, mean in means.items() if mean is not None}
+
+
+def _versions(path: Path) -> dict[str, str]:
+    packages: dict[str, str] = _json(path)["packages"]
+    return packages
+
+
+def _json(path: Path) -> dict[str, Any]:
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", error, "the file that fingers writes") from error

@@ -1,0 +1,200 @@
+"""The closed loop in plain C MuJoCo: physics at 200 Hz, the deployment shim at 50 Hz.
+
+`mujoco.mj_step` moves one hand, `fingers_deploy.PolicyController` moves its targets, as
+it would on the real hand. Of the training environment only the definitions are used:
+how worlds are drawn, the drive between target and servo, what the sensors tell, and
+when a hand has fallen. Physics runs in float64 and never through JAX.
+"""
+
+import copy
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import mujoco
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.base import State
+from envs.batch import BatchEnv
+from envs.hand.drive import DriveState, command_sequence
+from envs.hand.figures import figures
+from envs.hand.model import PHYSICS_DT_S
+from envs.memory import Memory
+from envs.observations import Sample
+from envs.physics import PhysicsOutput, PhysicsState
+from envs.randomize import Variation, model_fields
+from envs.sensing import sense
+from envs.signals import Command, extract_signals
+from fingers_deploy import Bundle, PolicyController
+from fingers_deploy.policy import Runtime
+from fingers_mjx.evaluate_record import Trace, record
+
+Schedule = Float[np.ndarray, "steps 3"]
+
+
+@dataclass(frozen=True)
+class Played:
+    """One episode.
+
+    Attributes:
+        trace: of every control step up to the fall, time first.
+        qpos: generalized positions, one more than steps.
+        held: steps in which the shim held its target because of a fault.
+    """
+
+    trace: Trace
+    qpos: Float[np.ndarray, "frames nq"]
+    held: int
+
+
+class Player:
+    """Plays episodes of one policy in the worlds of one environment.
+
+    Args:
+        env: worlds, drive and sensors of the task; its physics is not used.
+        bundle: the exported policy.
+        runtime: what runs the policy.
+
+    Raises:
+        BundleError: the joints of the bundle are not those of the hand.
+    """
+
+    def __init__(self, env: BatchEnv, bundle: Bundle, runtime: Runtime = "auto"):
+        self.env = env
+        self.controller = PolicyController(bundle, runtime)
+        self.controller.check_joint_order(figures().joint_names)
+        self._reset = jax.jit(env.env.reset)
+        self._read: Callable[..., Sample] = jax.jit(self._reading)
+        self._drive: Callable[..., Any] = jax.jit(self._commands)
+        self._judge: Callable[..., Any] = jax.jit(self._judged)
+
+    def play(self, key: Array, steps: int, schedule: Schedule | None = None) -> Played:
+        """Plays one episode, to its end or until the hand falls.
+
+        Args:
+            key: of the world, as `env.reset` takes it.
+            steps: control steps.
+            schedule: a command for each step; drawn as in training if not given.
+        """
+        start = self._reset(key)
+        model = varied_model(self.env, start.memory.lasting.variation)
+        data = mujoco.MjData(model)
+        data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
+        memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
+        self.controller.reset()
+        while len(rows) < steps and not (rows and rows[-1].done):
+            if schedule is not None:
+                command = jnp.asarray(schedule[len(rows)])
+                memory = dataclasses.replace(memory, command=command)
+            before = _state(data)
+            target = self._target(memory, before)
+            drive, commands = self._drive(memory.drive, target)
+            _advance(model, data, np.asarray(commands, float))
+            memory = dataclasses.replace(memory, drive=drive)
+            memory, row = self._judge(memory, before, _output(data), self.action)
+            rows.append(jax.device_get(row))
+            poses.append(data.qpos.copy())
+            held += self.controller.faults > 0
+        trace = jax.tree.map(lambda *x: np.stack(x), *rows)
+        return Played(trace, np.stack(poses), held)
+
+    @property
+    def action(self) -> Float[np.ndarray, "20"]:
+        """Last clipped policy output."""
+        return self.controller.action
+
+    def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
+        """Asks the shim, which is told what the sensors tell."""
+        told = self._read(memory, state)
+        reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
+        return self.controller.step(
+            np.asarray(told.joint_pos) + reference,
+            np.asarray(told.gravity),
+            np.asarray(told.angvel),
+            np.asarray(told.command),
+        )
+
+    def _reading(self, memory: Memory, state: PhysicsState) -> Sample:
+        env = self.env
+        reference = jnp.array(env.stance.joint_pos_rad)
+        inputs = env.task.inputs(vars(memory))
+        noise = env.config.randomize
+        return sense(noise, memory.lasting, reference, state, memory.action, inputs)
+
+    def _commands(
+        self, drive: DriveState, target: Float[Array, "20"]
+    ) -> tuple[DriveState, Float[Array, "n 20"]]:
+        substeps = self.env.physics.n_substeps
+        return command_sequence(
+            self.env.plant.drive, drive, target, PHYSICS_DT_S, substeps
+        )
+
+    def _judged(
+        self,
+        memory: Memory,
+        before: PhysicsState,
+        output: PhysicsOutput,
+        action: Float[Array, "20"],
+    ) -> tuple[Memory, Trace]:
+        """Returns the memory for the next step and this step's part of the trace."""
+        env = self.env
+        asked = Command(env.task.inputs(vars(memory)), action, memory.action)
+        q_off = jnp.array(env.stance.q_off)
+        signals = extract_signals(env.spec, q_off, before, output, asked, env.dt)
+        finite = jnp.all(jnp.isfinite(output.state.qpos))
+        done = (env.task.terminated(signals) | ~finite).astype(jnp.float32)
+        row = record(_judged_state(signals, done))
+        count = memory.lasting.total_steps + 1
+        after = dataclasses.replace(
+            memory,
+            lasting=dataclasses.replace(memory.lasting, total_steps=count),
+            action=action,
+            steps=memory.steps + 1,
+        )
+        return env.task.advance(after), row
+
+
+def varied_model(env: BatchEnv, variation: Variation) -> mujoco.MjModel:
+    """Returns the model of a world for C MuJoCo, which stops where it diverges.
+
+    Args:
+        env: of the nominal model.
+        variation: the world's draw.
+    """
+    model = copy.copy(env.mj_model)
+    fields = model_fields(env.mj_model, env.spec, variation)
+    for name, value in fields.items():
+        getattr(model, name)[:] = np.asarray(value)
+    # The compiler notes where a body's inertial frame is the body's own; no more.
+    model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
+    model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
+    return model
+
+
+def _advance(
+    model: mujoco.MjModel, data: mujoco.MjData, commands: Float[np.ndarray, "n 20"]
+) -> None:
+    for command in commands:
+        data.ctrl[:] = command
+        mujoco.mj_step(model, data)
+
+
+def _state(data: mujoco.MjData) -> PhysicsState:
+    vectors = (data.qpos, data.qvel, data.qacc_warmstart)
+    return PhysicsState(*(jnp.asarray(x, jnp.float32) for x in vectors))
+
+
+def _output(data: mujoco.MjData) -> PhysicsOutput:
+    sensors = jnp.asarray(data.sensordata, jnp.float32)
+    return PhysicsOutput(_state(data), sensors, jnp.zeros((), jnp.int32))
+
+
+def _judged_state(signals: Any, done: Array) -> State:
+    """What `record` reads of a state; a fall is no time limit."""
+    zero = jnp.zeros(())
+    info = {"truncation": zero}
+    return State(None, {}, zero, done, {}, info, signals, None)

@@ -1,0 +1,85 @@
+"""Video of a played episode: ray-cast, with a camera that follows the hand."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import mujoco
+import numpy as np
+from jaxtyping import Float
+
+from fingers_mjx.play import Played
+from fingers_mjx.raycast_camera import Camera
+from fingers_mjx.raycast_overlay import caption
+from fingers_mjx.raycast_shade import Look
+from fingers_mjx.video import Frame, follow, frames, write_mp4
+
+ASPECT = 9 / 16
+LOOK = Look(sky_samples=0)
+
+
+def write_video(
+    path: Path,
+    model: mujoco.MjModel,
+    played: Played,
+    dt_s: float,
+    fps: float,
+    width: int,
+    progress: Callable[[int, int], None],
+) -> Path:
+    """Writes an mp4 of an episode.
+
+    Args:
+        path: file to write.
+        model: the scene.
+        played: the episode.
+        dt_s: control interval.
+        fps: frames per second.
+        width: of the picture; its height is 9/16 of that.
+        progress: told (frames drawn, frames in all).
+    """
+    steps = frame_steps(len(played.qpos), dt_s, fps)
+    qpos = played.qpos[steps]
+    cameras = follow(_view(qpos[0]), qpos[:, :3], fps)
+    size = (width, 2 * round(width * ASPECT / 2))
+    pictures = frames(model, qpos, cameras, size, LOOK)
+    texts = [_text(played, step, dt_s) for step in steps]
+    return write_mp4(path, _captioned(pictures, texts, progress), fps)
+
+
+def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
+    """Returns the pose nearest in time to each frame."""
+    count = max(1, round((poses - 1) * dt_s * fps))
+    steps = np.rint(np.arange(count) / (fps * dt_s)).astype(int)
+    return np.minimum(steps, poses - 1)
+
+
+def _view(qpos: Float[np.ndarray, " nq"]) -> Camera:
+    """Returns a view from the front left of where the hand points."""
+    w, x, y, z = qpos[3:7]
+    # The fingers point along the palm's z.
+    heading = np.degrees(np.arctan2(2 * (y * z - w * x), 2 * (x * z + w * y)))
+    return Camera(
+        lookat_w=(0.0, 0.0, 0.065),
+        distance_m=0.52,
+        azimuth_deg=float(heading) + 125.0,
+        elevation_deg=-20.0,
+    )
+
+
+def _captioned(
+    pictures: Iterator[Frame],
+    texts: list[str],
+    progress: Callable[[int, int], None],
+) -> Iterator[Frame]:
+    for index, (picture, text) in enumerate(zip(pictures, texts, strict=True)):
+        yield caption(picture, text)
+        progress(index + 1, len(texts))
+
+
+def _text(played: Played, step: int, dt_s: float) -> str:
+    """Returns time and command of a pose."""
+    x, y, turn = played.trace.command[min(step, len(played.trace.command) - 1)]
+    return (
+        f"{step * dt_s:4.1f} s   command: forward {x:+.2f} m/s, left {y:+.2f} m/s, "
+        f"turn {turn:+.2f} rad/s"
+    )

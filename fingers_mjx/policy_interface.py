@@ -1,0 +1,106 @@
+"""What lies between a policy and the hand, taken from the environment it trained in."""
+
+import dataclasses
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from envs.batch import BatchEnv
+from envs.errors import InputError
+from envs.hand.figures import figures
+from envs.hand.hand_file import HandFile
+from envs.observations import HISTORY, TERMS
+from fingers_deploy.manifest import (
+    Action,
+    CommandPath,
+    Interface,
+    Observation,
+    Term,
+)
+
+TOLERANCE = 1e-6
+"""Largest difference between numbers that count as the same (settling rounds)."""
+
+# Name in the manifest, entries, frame and unit of each term of `envs.observations`.
+_TERMS: Mapping[str, tuple[str, int, str, str]] = {
+    "joint_pos": ("joint_pos", 20, "joint", "rad"),
+    "gravity": ("gravity_b", 3, "palm", "1"),
+    "angvel": ("angvel_b", 3, "palm", "rad/s"),
+    "action": ("previous_action", 20, "joint", "1"),
+    "command": ("command", 3, "V", "m/s m/s rad/s"),
+}
+
+
+def interface_of(env: BatchEnv) -> Interface:
+    """Returns the interface of a policy trained in `env`."""
+    stance, config = env.stance, env.config
+    limits = env.spec.joint_range_rad.tolist()
+    terms = tuple(_term(name) for name in TERMS)
+    command = config.command
+    return Interface(
+        joint_names=figures().joint_names,
+        reference_angles_rad=stance.joint_pos_rad,
+        joint_limits_rad=tuple((low, high) for low, high in limits),
+        initial_target_rad=stance.target_rad,
+        control_rate_hz=1.0 / env.dt,
+        observation=Observation(terms),
+        action=Action(scale_rad=config.action_scale_rad, clip=config.action_clip),
+        command_path=_command_path(env.hand),
+        command_ranges=(
+            command.vel_x_mps,
+            command.vel_y_mps,
+            command.yaw_rate_rps,
+        ),
+        v_quat_b=stance.q_off,
+    )
+
+
+def check_interface(source: object, found: Interface, ours: Interface) -> None:
+    """Refuses a policy whose interface is not that of the environment.
+
+    Args:
+        source: file of the policy, for the message.
+        found: interface of the policy.
+        ours: interface of the environment.
+
+    Raises:
+        InputError: naming the first field that differs.
+    """
+    theirs = dict(_leaves(dataclasses.asdict(found), "interface"))
+    for field, wanted in _leaves(dataclasses.asdict(ours), "interface"):
+        value = theirs.get(field, "nothing")
+        if not _same(value, wanted):
+            valid = f"{wanted}, as the environment has"
+            raise InputError(source, field, value, valid)
+
+
+def _term(name: str) -> Term:
+    manifest_name, size, frame, unit = _TERMS[name]
+    return Term(manifest_name, size, frame, unit, scale=1.0, history=HISTORY)
+
+
+def _command_path(hand: HandFile) -> CommandPath:
+    """Returns the drive's path; of the joints' speed limits, the lowest."""
+    return CommandPath(
+        delay_s=hand.delay_s.value,
+        lowpass_hz=hand.lowpass_hz.value,
+        slew_rad_s=float(hand.speed_limit.per_joint().min()),
+    )
+
+
+def _leaves(value: Any, field: str) -> Iterator[tuple[str, Any]]:
+    """Yields dotted names and values of nested dicts and lists."""
+    if isinstance(value, dict):
+        for name, inner in value.items():
+            yield from _leaves(inner, f"{field}.{name}")
+    elif isinstance(value, list | tuple):
+        yield f"{field}.length", len(value)
+        for index, inner in enumerate(value):
+            yield from _leaves(inner, f"{field}[{index}]")
+    else:
+        yield field, value
+
+
+def _same(found: Any, wanted: Any) -> bool:
+    if isinstance(found, float) and isinstance(wanted, float):
+        return abs(found - wanted) <= TOLERANCE
+    return found == wanted

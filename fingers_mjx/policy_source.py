@@ -1,0 +1,97 @@
+"""A trained policy with the task and the hand it was trained for.
+
+Read from a run directory (its newest checkpoint) or from an exported bundle, beside
+which `config.yaml` and `hand.yaml` say what it was trained in.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from envs.errors import InputError
+from envs.hand.figures import figures
+from fingers_deploy import Bundle, load_bundle
+from fingers_deploy.bundle import POLICY_FILE
+from fingers_mjx.policy_interface import check_interface, interface_of
+from fingers_mjx.ppo_policy import Network, load_policy
+from fingers_mjx.run_setup import Setup, config_digest, load_setup, make_env, run_setup
+from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE
+
+
+@dataclass(frozen=True)
+class PolicySource:
+    """A policy and what it was trained in.
+
+    Attributes:
+        path: as the user gave it.
+        setup: settings and hand of the training.
+        network: normalizer and layers.
+        steps_trained: control steps of all worlds behind it.
+    """
+
+    path: Path
+    setup: Setup
+    network: Network
+    steps_trained: int
+
+
+def load_source(path: Path) -> PolicySource:
+    """Reads a policy from wherever training or export has put it.
+
+    Args:
+        path: run directory, bundle directory or the bundle's ONNX file.
+
+    Raises:
+        InputError: neither of them, or files that do not belong together.
+        BundleError: a bundle that is damaged or made for another hand.
+    """
+    if is_run(path):
+        policy = load_policy(path)
+        return PolicySource(path, run_setup(path), policy, policy.meta["env_steps"])
+    bundle, setup = load_bundle_setup(path)
+    steps = bundle.manifest.provenance.normalizer.steps
+    return PolicySource(path, setup, bundle.network, steps)
+
+
+def is_run(path: Path) -> bool:
+    """Tells whether `path` is a run directory, of whichever version."""
+    return (path / RUN_FILE).is_file()
+
+
+def check_run(path: Path) -> None:
+    """Raises InputError if `path` is no run directory."""
+    if not is_run(path):
+        found = "a directory without a run" if path.is_dir() else "no directory"
+        raise InputError(path, "", found, "a directory made by fingers train")
+
+
+def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
+    """Reads a bundle with the settings and the hand that were exported with it.
+
+    Raises:
+        InputError: no bundle; files beside it that are missing, not those of its
+            export, or of a task that has changed since.
+        BundleError: a bundle that is damaged or made for another hand.
+    """
+    _check_kind(path)
+    bundle = load_bundle(path, figures().joint_names)
+    directory = path if path.is_dir() else path.parent
+    found = config_digest(directory)
+    wanted = bundle.manifest.provenance.config_sha256
+    if found != wanted:
+        what = f"{CONFIG_FILE} and {HAND_FILE}"
+        valid = f"the files of this policy's export (SHA-256 {wanted[:12]}…)"
+        raise InputError(directory, what, f"SHA-256 {found[:12]}…", valid)
+    task = bundle.manifest.task
+    setup = load_setup(directory / CONFIG_FILE, directory / HAND_FILE, task)
+    ours = interface_of(make_env(setup, 1, "cpu"))
+    check_interface(bundle.source, bundle.manifest.interface, ours)
+    return bundle, setup
+
+
+def _check_kind(path: Path) -> None:
+    """Refuses a path that cannot be a bundle."""
+    valid = f"a run directory, a directory with {POLICY_FILE}, or an exported ONNX file"
+    if not path.exists():
+        raise InputError(path, "", "no such file or directory", valid)
+    if path.is_dir() and not (path / POLICY_FILE).is_file():
+        raise InputError(path, "", f"a directory without {POLICY_FILE}", valid)
