@@ -1,0 +1,73 @@
+"""Unit quaternions w x y z, in plain floats: faster than arrays at this size."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Vector = Sequence[float] | Array
+
+
+def multiply(a: Vector, b: Vector) -> Array:
+    """Hamilton product a ⊗ b: first the rotation b, then a; [4]."""
+    aw, ax, ay, az = a
+    bw, bx, by, bz = b
+    return np.array(
+        (
+            aw * bw - ax * bx - ay * by - az * bz,
+            aw * bx + ax * bw + ay * bz - az * by,
+            aw * by - ax * bz + ay * bw + az * bx,
+            aw * bz + ax * by - ay * bx + az * bw,
+        )
+    )
+
+
+def unrotate(q: Vector, v: Vector) -> Array:
+    """Turns world components of v into those of the frame q: q* ⊗ v ⊗ q; [3]."""
+    w, x, y, z = q
+    a, b, c = v
+    # t = 2 (−u) × v with u the vector part; v + w t + (−u) × t
+    tx, ty, tz = 2 * (z * b - y * c), 2 * (x * c - z * a), 2 * (y * a - x * b)
+    return np.array(
+        (
+            a + w * tx + z * ty - y * tz,
+            b + w * ty + x * tz - z * tx,
+            c + w * tz + y * tx - x * ty,
+        )
+    )
+
+
+def conjugate(q: Vector) -> Array:
+    """The inverse rotation of a unit quaternion, [4]."""
+    w, x, y, z = q
+    return np.array((w, -x, -y, -z))
+
+
+def gravity(quat_w: Vector) -> Array:
+    """Unit vector of gravity (points down) in a frame of this orientation, [3]."""
+    w, x, y, z = quat_w
+    return np.array(
+        (2 * (w * y - x * z), -2 * (w * x + y * z), 2 * (x * x + y * y) - 1.0)
+    )
+
+
+def tilt(gravity_v: Vector) -> tuple[float, float]:
+    """Roll and pitch of V against level [rad], from gravity in V.
+
+    With the up direction u = −g in V: roll = atan2(u_y, u_z), pitch = asin(−u_x).
+    """
+    x, y, z = gravity_v
+    return math.atan2(-y, -z), math.asin(max(-1.0, min(1.0, x)))
+
+
+def heading(quat_w: Vector) -> float:
+    """Angle of the frame's x axis about the world's up direction [rad], in (−π, π]."""
+    w, x, y, z = quat_w
+    return math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+
+
+def wrap(angle_rad: float) -> float:
+    """The same angle in [−π, π)."""
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi
