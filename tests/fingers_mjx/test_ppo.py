@@ -4,16 +4,12 @@ import functools
 import hashlib
 import importlib.util
 import re
-import sys
 from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from probe_envs import Fault, probe
 
 from fingers_mjx.ppo import compile_iterations, make_iteration

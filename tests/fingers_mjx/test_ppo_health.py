@@ -1,16 +1,11 @@
 """Updates that are not finite are skipped, counted, and named by their first fault."""
 
 import dataclasses
-import sys
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from probe_envs import probe
 
 from fingers_mjx.ppo_brax import learning_rate

@@ -1,14 +1,10 @@
 """The driver: the same curve whatever happens on the way, and honest ends."""
 
-import sys
 from pathlib import Path
 
 import jax
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 import train_setup
 from probe_envs import Fault, probe
 from train_setup import assert_same_end, curve, leaves, make_env, run

@@ -10,9 +10,6 @@ import time
 from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parent))
-
 import train_setup
 from train_setup import assert_same_end, curve, leaves, run
 
@@ -23,7 +20,8 @@ SCRIPT = Path(train_setup.__file__)
 
 
 def start(path, *words):
-    environment = os.environ | {"JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "3"}
+    settings = {"JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "3"}
+    environment = os.environ | settings | {"PYTHONPATH": str(train_setup.ROOT)}
     command = [sys.executable, str(SCRIPT), str(path), *words]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment

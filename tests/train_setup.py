@@ -9,8 +9,6 @@ import os
 import sys
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parents[1]))
-
 from probe_envs import probe
 
 from fingers_mjx import checkpoint
@@ -19,7 +17,7 @@ from fingers_mjx.rundir_metrics import read_metrics
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Interrupted
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[1]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))
 
 PPO = PpoConfig(
