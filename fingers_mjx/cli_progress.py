@@ -16,7 +16,7 @@ Count = Callable[[int, int], None]
 
 @contextmanager
 def counting(stream: TextIO, what: str, unit: str) -> Iterator[Count]:
-    """Yields a function to be told (done, in all); says "compiling" until then.
+    """Yields a function to be told (done, in all); says "preparing" until then.
 
     Args:
         stream: where the lines go.
@@ -24,7 +24,7 @@ def counting(stream: TextIO, what: str, unit: str) -> Iterator[Count]:
         unit: what is counted, such as "steps".
     """
     show = _Line(stream, what, unit)
-    with Ticker(show.compiling, 1.0) as ticker:
+    with Ticker(show.preparing, 1.0) as ticker:
 
         def count(done: int, total: int) -> None:
             ticker.stop()
@@ -42,9 +42,10 @@ class _Line:
         self._live = stream.isatty()
         self._said_s = -LINE_EVERY_S
 
-    def compiling(self, event: Event) -> None:
-        elapsed_s = event["elapsed_s"]
-        self._say(f"{self._what}: compiling… {elapsed_s:.0f} s", event, False)
+    def preparing(self, tick: Event) -> None:
+        elapsed_s = tick["elapsed_s"]
+        event = {"event": self._what, "preparing_s": elapsed_s}
+        self._say(f"{self._what}: preparing… {elapsed_s:.0f} s", event, False)
 
     def count(self, done: int, total: int) -> None:
         event = {"event": self._what, "done": done, "total": total, "unit": self._unit}

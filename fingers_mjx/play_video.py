@@ -61,7 +61,7 @@ def _view(qpos: Float[np.ndarray, " nq"]) -> Camera:
     return Camera(
         lookat_w=(0.0, 0.0, 0.065),
         distance_m=0.52,
-        azimuth_deg=float(heading) + 125.0,
+        azimuth_deg=float(heading) + 230.0,
         elevation_deg=-20.0,
     )
 

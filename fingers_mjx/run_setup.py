@@ -18,7 +18,6 @@ from envs.errors import InputError
 from envs.hand.figures import figures
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.model import build_spec
-from envs.hand.stance import Stance, load_stance, settle
 from envs.observations import TERMS
 from envs.registry import get_task, make_batch
 from fingers_mjx.ppo_config import TrainConfig
@@ -90,18 +89,6 @@ def overridden(setup: Setup, assignments: Iterable[str]) -> Setup:
     )
 
 
-def stance_of(hand: HandFile) -> Stance:
-    """Returns the settled stance of a hand: the stored targets, held for 4 s.
-
-    Raises:
-        InputError: this hand cannot stand with those targets.
-    """
-    stored = load_stance()
-    if hand.sha256 == stored.hand_sha256:
-        return stored
-    return settle(hand, stored.qpos, np.array(stored.target_rad))
-
-
 def make_env(
     setup: Setup, num_envs: int, backend: str, auto_reset: bool = True
 ) -> BatchEnv:
@@ -117,7 +104,6 @@ def make_env(
         backend,
         auto_reset,
         hand=setup.hand,
-        stance=stance_of(setup.hand),
     )
 
 
