@@ -1,0 +1,46 @@
+import dataclasses
+
+import jax
+import numpy as np
+import pytest
+
+from envs.commands import CommandConfig, sample_command
+from envs.errors import InputError
+
+COUNT = 4000
+
+
+def draw(config):
+    print("seed 20260113")
+    keys = jax.random.split(jax.random.key(20260113), COUNT)
+    return np.asarray(jax.vmap(lambda key: sample_command(key, config))(keys))
+
+
+def test_commands_fill_the_ranges_of_the_paper():
+    commands = draw(CommandConfig(standing_fraction=0.0))
+    low, high = np.array([0.0, -0.16, -0.45]), np.array([0.16, 0.16, 0.45])
+    width = high - low
+    assert (commands >= low).all() and (commands <= high).all()
+    assert (commands.min(axis=0) < low + 0.005 * width).all()
+    assert (commands.max(axis=0) > high - 0.005 * width).all()
+
+
+def test_some_commands_are_to_stand_and_the_others_stay_as_they_are():
+    moving, mixed = draw(CommandConfig(standing_fraction=0.0)), draw(CommandConfig())
+    standing = (mixed == 0).all(axis=1)
+    # 5 % of 4,000 with five standard deviations of 14 on each side
+    assert 130 < standing.sum() < 270
+    np.testing.assert_array_equal(mixed[~standing], moving[~standing])
+    assert (draw(CommandConfig(standing_fraction=1.0)) == 0).all()
+
+
+def test_another_range_moves_no_other_command():
+    fast = dataclasses.replace(CommandConfig(), vel_x_mps=(0.0, 0.3))
+    before, after = draw(CommandConfig()), draw(fast)
+    np.testing.assert_array_equal(before[:, 1:], after[:, 1:])
+    assert (before[:, 0] != after[:, 0]).mean() > 0.9
+
+
+def test_a_range_the_wrong_way_round_is_refused():
+    with pytest.raises(InputError, match=r"yaw_rate_rps: found \[1, -1\]"):
+        CommandConfig(yaw_rate_rps=(1.0, -1.0))
