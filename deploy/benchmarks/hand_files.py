@@ -1,0 +1,86 @@
+"""What the measurements run on: the hand's model, and a policy that marches in place.
+
+A trained policy is better; this one needs no training: a clipped linear oscillator over
+its own previous actions, which lifts the fingers in turn.
+"""
+
+from pathlib import Path
+
+import numpy as np
+
+from envs.hand.figures import figures
+from envs.hand.hand_file import load_hand_file
+from envs.hand.model import build_spec
+from envs.hand.stance import load_stance
+from fingers_deploy.bundle import Bundle
+from fingers_deploy.manifest import (
+    Action,
+    CommandPath,
+    Interface,
+    Normalizer,
+    Observation,
+    Provenance,
+    Term,
+)
+from fingers_mjx.bundle import encode_bundle
+from fingers_mjx.onnx_graph import PolicyWeights
+
+HISTORY = 8
+PERIOD_STEPS = 15
+CLIP = 0.35  # small steps, so that the hand stands
+TERMS = (
+    Term("joint_pos", 20, "joint", "rad", 1.0, HISTORY),
+    Term("gravity_b", 3, "palm", "1", 1.0, HISTORY),
+    Term("angvel_b", 3, "palm", "rad/s", 1.0, HISTORY),
+    Term("previous_action", 20, "joint", "1", 1.0, HISTORY),
+    Term("command", 3, "V", "m/s m/s rad/s", 1.0, HISTORY),
+)
+
+
+def write_model(path: Path) -> Path:
+    """Writes the calibrated hand in its stance as MJCF."""
+    stance = load_stance()
+    spec = build_spec(load_hand_file(), np.array(stance.q_off))
+    spec.add_key(name="stance", qpos=stance.qpos, ctrl=stance.target_rad)
+    spec.compile()
+    path.write_text(spec.to_xml(), "utf-8")
+    return path
+
+
+def hand_interface() -> Interface:
+    """The crawl interface of the calibrated hand."""
+    stance = load_stance()
+    links = figures().links
+    return Interface(
+        joint_names=tuple(link.joint for link in links),
+        reference_angles_rad=stance.joint_pos_rad,
+        joint_limits_rad=tuple(tuple(link.range_rad) for link in links),
+        initial_target_rad=stance.target_rad,
+        control_rate_hz=50.0,
+        observation=Observation(TERMS),
+        action=Action(scale_rad=0.06, clip=CLIP),
+        command_path=CommandPath(delay_s=0.02, lowpass_hz=3.0, slew_rad_s=2.8),
+        command_ranges=((0.0, 0.16), (-0.16, 0.16), (-0.45, 0.45)),
+        v_quat_b=stance.q_off,
+    )
+
+
+def marching_bundle(task: str = "crawl") -> Bundle:
+    """A policy that marches: a_t = 2ρ cos(ω) a_{t−1} − ρ² a_{t−2} − 2 (q_t − q_ref)."""
+    growth, omega = 1.03, 2 * np.pi / PERIOD_STEPS
+    weight, bias = np.zeros((392, 20)), np.zeros(20)
+    newest_pos, newest_action = 7 * 20, 8 * 26 + 7 * 20
+    for joint in range(20):
+        weight[newest_pos + joint, joint] = -2.0  # back to the reference pose
+    for finger, sign in enumerate((1, -1, 1, -1, 1)):
+        joint = 4 * finger if finger else 1
+        weight[newest_action + joint, joint] = 2 * growth * np.cos(omega)
+        weight[newest_action - 20 + joint, joint] = -(growth**2)
+        bias[joint] = 0.05 * sign
+    zero, one = np.zeros(392, np.float32), np.ones(392, np.float32)
+    layers = ((weight.astype(np.float32), bias.astype(np.float32)),)
+    weights = PolicyWeights(layers, zero, one, CLIP)
+    obs = np.random.default_rng(0).normal(0, 0.3, (8, 392)).astype(np.float32)
+    action = np.clip(obs @ layers[0][0] + layers[0][1], -CLIP, CLIP)
+    provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
+    return encode_bundle(weights, task, hand_interface(), provenance, (obs, action))

@@ -1,0 +1,1 @@
+"""Drivers: a simulated hand, a recorded one, and the WUJI hand, behind one protocol."""
