@@ -1,0 +1,92 @@
+"""The layers above bare physics: through JAX, the complete environment, PPO."""
+
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+from bare import Layer, bare_cpu, bare_warp
+
+from envs.batch import BatchEnv
+from envs.randomize import model_fields
+
+ACTION_STD = 0.3
+
+
+def bare_physics(batch: BatchEnv, repeat: int) -> Layer:
+    """Native batch stepping; the backend jax has none other than `through_jax`."""
+    backend = {"cpu": bare_cpu, "warp": bare_warp}.get(_backend(batch))
+    if backend is None:
+        return through_jax(batch, repeat)
+    env: Any = batch.env
+    return backend(env, batch.num_envs)
+
+
+def through_jax(batch: BatchEnv, repeat: int) -> Layer:
+    """The physics backend as the environment calls it, with randomized models."""
+    env: Any = batch.env
+    worlds = jax.jit(batch.reset)(jax.random.key(0))
+    ctrl = jnp.tile(jnp.array(env.stance.target_rad), (env.physics.n_substeps, 1))
+
+    def one(variation: Any, data: Any) -> Any:
+        fields = model_fields(env.mj_model, env.spec, variation)
+        return env.physics.step(fields, data, ctrl).state
+
+    @jax.jit
+    def many(variation: Any, data: Any) -> Any:
+        step = jax.vmap(one)
+        return jax.lax.fori_loop(0, repeat, lambda _, d: step(variation, d), data)
+
+    variation = worlds.memory.lasting.variation
+    return Layer(lambda: jax.block_until_ready(many(variation, worlds.data)), repeat)
+
+
+def environment(batch: BatchEnv, repeat: int) -> Layer:
+    """Complete environment steps with small random actions."""
+
+    @jax.jit
+    def many(state: Any, key: jax.Array) -> Any:
+        def body(carry: Any, key: jax.Array) -> tuple[Any, None]:
+            shape = (batch.num_envs, batch.action_size)
+            return batch.step(carry, ACTION_STD * jax.random.normal(key, shape)), None
+
+        return jax.lax.scan(body, state, jax.random.split(key, repeat))[0]
+
+    state = jax.jit(batch.reset)(jax.random.key(0))
+    return Layer(lambda: jax.block_until_ready(many(state, jax.random.key(1))), repeat)
+
+
+def ppo(batch: BatchEnv, repeat: int) -> Layer:
+    """Complete PPO iterations with the paper's networks, unroll and epochs."""
+    del repeat
+    from fingers_mjx.ppo import compile_iterations, make_iteration
+    from fingers_mjx.ppo_config import PpoConfig
+    from fingers_mjx.ppo_state import init_train_state, make_learner
+
+    config = PpoConfig()
+    learner = make_learner(batch, config)
+    iterate = compile_iterations(make_iteration(batch, learner))
+    carry = [
+        init_train_state(learner, batch, jax.random.key(0)),
+        jax.jit(batch.reset)(jax.random.key(1)),
+        jax.random.key(2),
+    ]
+
+    def call() -> None:
+        *carry[:], _ = iterate(*carry)
+        jax.block_until_ready(carry[0])
+
+    return Layer(call, config.unroll_length)
+
+
+def _backend(batch: BatchEnv) -> str:
+    """Returns the name of the backend of an environment."""
+    env: Any = batch.env
+    return getattr(env.physics, "impl", "cpu")
+
+
+LAYERS = {
+    "bare physics": bare_physics,
+    "physics through JAX": through_jax,
+    "environment": environment,
+    "PPO": ppo,
+}

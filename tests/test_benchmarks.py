@@ -1,0 +1,30 @@
+"""The benchmark runs and its ratios are those of its figures."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+SCRIPT = Path(__file__).parents[1] / "benchmarks" / "throughput.py"
+
+
+@pytest.mark.slow
+def test_throughput_is_measured_and_compared(tmp_path):
+    out = tmp_path / "out.json"
+    words = "--backend cpu --against jax --num-envs 8 --seconds 0.1 --json".split()
+    done = subprocess.run(
+        [sys.executable, str(SCRIPT), *words, str(out)],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    found = json.loads(out.read_text(encoding="utf-8"))
+    rates = {(r["backend"], r["layer"]): r["steps_per_s"] for r in found["layers"]}
+    assert len(rates) == 5 and min(rates.values()) > 0
+    ratio = found["ratios"]["environment / bare physics"]
+    assert ratio == rates["cpu", "environment"] / rates["cpu", "bare physics"]
+    factor = found["ratios"]["environment: cpu / jax"]
+    assert factor == rates["cpu", "environment"] / rates["jax", "environment"]
+    assert f"environment: cpu / jax: {factor:.3g}" in done.stdout
