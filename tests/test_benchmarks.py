@@ -13,7 +13,17 @@ SCRIPT = Path(__file__).parents[1] / "benchmarks" / "throughput.py"
 @pytest.mark.slow
 def test_throughput_is_measured_and_compared(tmp_path):
     out = tmp_path / "out.json"
-    words = "--backend cpu --against jax --num-envs 8 --seconds 0.1 --json".split()
+    words = [
+        "--backend",
+        "cpu",
+        "--against",
+        "jax",
+        "--num-envs",
+        "8",
+        "--seconds",
+        "0.1",
+        "--json",
+    ]
     done = subprocess.run(
         [sys.executable, str(SCRIPT), *words, str(out)],
         capture_output=True,
