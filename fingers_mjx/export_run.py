@@ -4,8 +4,6 @@ import json
 from pathlib import Path
 from typing import Any
 
-import jax
-
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
@@ -20,8 +18,8 @@ from fingers_mjx.export import (
 )
 from fingers_mjx.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
-from fingers_mjx.ppo_policy import read
-from fingers_mjx.ppo_state import init_train_state, make_learner
+from fingers_mjx.ppo_policy import read, warm_started
+from fingers_mjx.ppo_state import make_learner, train_template
 from fingers_mjx.run_setup import Setup, config_digest, make_env, run_setup
 from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
 
@@ -42,7 +40,7 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
     """
     setup, saved = run_setup(run_dir), read(run_dir)
     env = make_env(setup, 1, "cpu")
-    weights, apply = _network(setup, saved, env)
+    weights, apply = _network(setup, run_dir, env)
     report = export_policy(
         out_dir,
         weights,
@@ -58,17 +56,13 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
     return report
 
 
-def _network(setup: Setup, saved: Saved, env: BatchEnv) -> tuple[PolicyWeights, Apply]:
+def _network(setup: Setup, run_dir: Path, env: BatchEnv) -> tuple[PolicyWeights, Apply]:
     """Returns the actor's weights, and the actor as training ran it."""
-    learner = make_learner(env, setup.train.ppo)
-    empty = jax.eval_shape(
-        lambda key: init_train_state(learner, env, key), jax.random.key(0)
-    )
-    wanted = {"params": empty.params, "normalizer": empty.normalizer}
-    train = saved.part({"train": wanted})["train"]
-    actor, normalizer = train["params"].policy, train["normalizer"]
+    train = warm_started(train_template(env, setup.train.ppo), run_dir)
+    actor, normalizer = train.params.policy, train.normalizer
     weights = brax_weights(actor, normalizer, setup.env.action_clip)
-    return weights, brax_apply(learner.networks.policy_network, normalizer, actor)
+    network = make_learner(env, setup.train.ppo).networks.policy_network
+    return weights, brax_apply(network, normalizer, actor)
 
 
 def _provenance(run_dir: Path, saved: Saved) -> Provenance:

@@ -95,6 +95,14 @@ def init_train_state(learner: Learner, env: BatchEnv, key: PRNGKeyArray) -> Trai
     return strong(state)
 
 
+def train_template(env: BatchEnv, config: PpoConfig) -> TrainState:
+    """Returns shapes and types of what learning changes."""
+    learner = make_learner(env, config)
+    return jax.eval_shape(
+        lambda key: init_train_state(learner, env, key), jax.random.key(0)
+    )
+
+
 def strong(tree: Any) -> Any:
     """Returns `tree` in arrays of their own with fixed types.
 

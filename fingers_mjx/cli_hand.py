@@ -1,0 +1,39 @@
+"""`fingers hand show` and `fingers hand stance`."""
+
+import argparse
+from pathlib import Path
+
+from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
+from envs.hand.stance import settle, stance_json, stance_of
+from envs.hand.stance_search import search_stance
+from fingers_mjx.evaluate_files import write_atomic
+
+
+def run(args: argparse.Namespace) -> int:
+    """Shows the hand or searches its stance."""
+    hand = load_hand_file(args.hand or DEFAULT_HAND_FILE)
+    if args.action == "show":
+        return _show(hand, args.out)
+    qpos, target = search_stance(hand, args.seed)
+    text = stance_json(settle(hand, qpos, target))
+    if args.out:
+        args.out.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(args.out, text.encode())
+    else:
+        print(text, end="")
+    return 0
+
+
+def _show(hand: HandFile, out: Path) -> int:
+    from PIL import Image
+
+    from fingers_mjx.hand_show import facts, pictures, posed
+
+    standing = posed(hand, stance_of(hand))
+    for name, value in facts(standing).items():
+        print(f"{name:24} {value:8.1f}")
+    out.mkdir(parents=True, exist_ok=True)
+    for name, picture in pictures(standing).items():
+        Image.fromarray(picture).save(out / f"{name}.png")
+        print(f"wrote {out / f'{name}.png'}")
+    return 0

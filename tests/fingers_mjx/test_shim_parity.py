@@ -1,0 +1,162 @@
+"""The shim on the robot and the environment in training: the same inputs and targets.
+
+Both see the same states; the shim only through what a robot would measure.
+"""
+
+from functools import partial
+from itertools import pairwise
+
+import jax
+import numpy as np
+import pytest
+from cli_setup import make_bundle, make_setup, random_weights
+
+from envs.commands import CommandConfig
+from envs.randomize import no_randomization
+from fingers_deploy import ActionTransform, PolicyController, load_bundle
+from fingers_mjx.ppo_policy import act
+from fingers_mjx.run_setup import make_env
+
+STEPS = 40
+TOLERANCE = 1e-6
+CLIP = 1.0
+
+
+@pytest.fixture(scope="module")
+def setup():
+    """No noise; starts off the stance; a new command every 0.2 s."""
+    return make_setup(
+        action_clip=CLIP,
+        randomize=no_randomization(0.88),
+        command=CommandConfig(resample_s=0.2),
+    )
+
+
+@pytest.fixture(scope="module")
+def bundle(setup, tmp_path_factory):
+    path = tmp_path_factory.mktemp("parity") / "bundle"
+    # Strong enough to reach the clip of the action and the limits of joints.
+    return load_bundle(make_bundle(path, setup, random_weights(gain=3.0)))
+
+
+@pytest.fixture(scope="module")
+def world(setup):
+    env = make_env(setup, 1, "cpu").env
+    return jax.jit(env.reset), jax.jit(env.step)
+
+
+@pytest.fixture(scope="module", params=["onnxruntime", "numpy"])
+def rollout(request, world, bundle):
+    """States of one world that the shim drives, one more than actions."""
+    reset, step = world
+    controller = PolicyController(bundle, request.param)
+    states = [jax.device_get(reset(jax.random.key(4)))]
+    while len(states) <= STEPS:
+        controller.step(**measured(states[-1]))
+        states.append(jax.device_get(step(states[-1], controller.action)))
+    return request.param, states
+
+
+def measured(state):
+    """What encoders, IMU and operator tell, in the shim's words."""
+    w, x, y, z = state.data.qpos[3:7]
+    down_b = -np.array(
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
+    )
+    return {
+        "joint_pos": state.data.qpos[7:],
+        "gravity_b": down_b,
+        "angvel_b": state.data.qvel[3:6],
+        "command": state.memory.command,
+    }
+
+
+def differences(bundle, rollout, change=lambda told: told):
+    """Largest difference of observation, action and target over the rollout."""
+    runtime, states = rollout
+    controller = PolicyController(bundle, runtime)
+    decide = partial(act, bundle.network)
+    worst = np.zeros(3)
+    for state, after in pairwise(states):
+        target = controller.step(**change(measured(state)))
+        action = np.clip(decide(state.obs["state"]), -CLIP, CLIP)
+        pairs = (
+            (controller.observation, state.obs["state"]),
+            (controller.action, action),
+            (target, after.memory.target),
+        )
+        worst = np.maximum(worst, [np.abs(a - b).max() for a, b in pairs])
+    return dict(zip(("observation", "action", "target"), worst, strict=True))
+
+
+def test_shim_equals_environment(bundle, rollout):
+    found = differences(bundle, rollout)
+    assert found["observation"] <= TOLERANCE
+    assert found["action"] <= 1e-5
+    assert found["target"] <= TOLERANCE
+
+
+def test_the_rollout_exercises_what_could_differ(rollout):
+    states = rollout[1]
+    actions = np.stack([s.memory.action for s in states[1:]])
+    commands = {tuple(s.memory.command.tolist()) for s in states}
+    tilts = np.stack([s.obs["state"][160:163] for s in states])
+    assert np.mean(np.abs(actions) == CLIP) > 0.05
+    assert np.std(actions, axis=0).min() > 0.01
+    assert len(commands) >= 4
+    assert np.ptp(tilts, axis=0).max() > 0.02
+
+
+def test_targets_are_equal_for_any_action(bundle, world):
+    """Also beyond the clip and at the joint limits, which a policy may not reach."""
+    reset, step = world
+    transform = ActionTransform(bundle.manifest.interface)
+    start = reset(jax.random.key(1))
+    limits = np.array(bundle.manifest.interface.joint_limits_rad, np.float32)
+    rng = np.random.default_rng(2)
+    targets = [limits[:, 0], limits[:, 1], np.array(start.memory.target)]
+    for target in targets:
+        action = rng.normal(0, 2, 20).astype(np.float32)
+        state = start.replace(memory=start.memory.replace(target=target))
+        ours = transform.step(target, action)
+        assert np.abs(ours - step(state, action).memory.target).max() <= TOLERANCE
+        assert np.abs(ours - transform.step(target, 2 * action)).max() > 1e-3
+
+
+def swap_joints(told):
+    joints = np.array(told["joint_pos"])
+    joints[[4, 8]] = joints[[8, 4]]
+    return told | {"joint_pos": joints}
+
+
+def flip_gravity(told):
+    return told | {"gravity_b": -told["gravity_b"]}
+
+
+def world_angvel(told):
+    return told | {"angvel_b": told["angvel_b"][::-1]}
+
+
+def degrees(told):
+    return told | {"joint_pos": np.degrees(told["joint_pos"])}
+
+
+WRONG = [swap_joints, flip_gravity, world_angvel, degrees]
+
+
+@pytest.mark.parametrize("wrong", WRONG, ids=lambda f: f.__name__)
+def test_wrong_measurement_is_found(bundle, rollout, wrong):
+    found = differences(bundle, rollout, wrong)
+    assert found["observation"] > 1e-2
+    assert found["target"] > 1e-3
+
+
+def test_wrong_order_in_time_is_found(bundle, rollout):
+    runtime, states = rollout
+    controller = PolicyController(bundle, runtime)
+    for state in states[:20]:
+        controller.step(**measured(state))
+    ours, joints = controller.observation, states[19].obs["state"][:160].reshape(8, 20)
+    assert np.abs(ours[:160] - joints.ravel()).max() <= TOLERANCE
+    assert np.abs(ours[:160] - joints[::-1].ravel()).max() > 1e-3
+    assert np.abs(ours[:160] - joints.T.ravel()).max() > 1e-2
