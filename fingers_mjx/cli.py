@@ -1,7 +1,8 @@
 """The command `fingers`: train, evaluate, export, play, show the hand, demonstrate.
 
-Exit status: 0 done; 2 bad input; 3 learning diverged; 4 no room on the disk; 75 stopped
-by a signal after a checkpoint, go on with --resume; 130 stopped by the keyboard.
+Exit status: 0 done; 2 bad input; 3 learning diverged; 4 no room on the disk; 6 an
+installation that cannot work; 75 stopped by a signal after a checkpoint, go on with
+--resume; 130 stopped by the keyboard.
 """
 
 import importlib
@@ -11,6 +12,7 @@ import warnings
 from collections.abc import Sequence
 
 from fingers_mjx.cli_parser import UsageError, make_parser
+from fingers_mjx.installation import check_installation
 
 BAD_INPUT, DISK_FULL, KEYBOARD = 2, 4, 130
 _EXTRAS = {
@@ -32,6 +34,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:
         args = make_parser().parse_args(argv)
+        check_installation()
         # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
         warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
         importlib.import_module("envs.physics.quiet_mjx")
@@ -52,12 +55,12 @@ def _status(error: Exception) -> int | None:
         return BAD_INPUT
     if isinstance(error, ModuleNotFoundError):
         return BAD_INPUT if error.name in _EXTRAS else None
+    if (status := getattr(error, "exit_code", None)) is not None:
+        return status
     from envs.errors import InputError
     from fingers_deploy import BundleError
     from fingers_mjx.rundir_files import is_full
 
-    if (status := getattr(error, "exit_code", None)) is not None:
-        return status
     if is_full(error):
         return DISK_FULL
     if isinstance(error, InputError | BundleError | OSError):

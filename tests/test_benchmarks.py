@@ -25,7 +25,7 @@ def test_throughput_is_measured_and_compared(tmp_path):
         "--json",
     ]
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), *words, str(out)],
+        [sys.executable, str(SCRIPT), *words],
         capture_output=True,
         text=True,
         check=True,
