@@ -14,7 +14,7 @@ def run(args: argparse.Namespace) -> int:
     hand = load_hand_file(args.hand or DEFAULT_HAND_FILE)
     if args.action == "show":
         return _show(hand, args.out)
-    qpos, target = search_stance(hand, args.seed)
+    qpos, target = search_stance(hand, args.seed, args.starts)
     text = stance_json(settle(hand, qpos, target))
     if args.out:
         args.out.parent.mkdir(parents=True, exist_ok=True)

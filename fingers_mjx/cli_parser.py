@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import NoReturn
 
 MAX_SEED = 2**32 - 1
+STANCE_STARTS = 16
+"""Starts with which the stored stance was found."""
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 
 
@@ -218,6 +220,12 @@ def _hand(commands) -> None:
         description="Searches the stance, settles it for 4 s and prints it as JSON.",
     )
     _seed(stance)
+    stance.add_argument(
+        "--starts",
+        type=whole(1),
+        default=STANCE_STARTS,
+        help=f"random starts of the search (default {STANCE_STARTS})",
+    )
     stance.add_argument("--out", type=Path, metavar="FILE", help="instead of stdout")
     for action in (show, stance):
         action.add_argument(

@@ -1,0 +1,25 @@
+"""`fingers demo`: everything once, on the CPU, into one report."""
+
+import argparse
+import sys
+from functools import partial
+
+from fingers_mjx.cli_progress import counting
+from fingers_mjx.demo import POLICY_DIR, demo
+from fingers_mjx.demo_screen import Screen
+from fingers_mjx.progress import reporter
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs the demonstration; progress and the place of the report go to stdout."""
+    policy = args.policy or POLICY_DIR
+    screen = Screen(
+        say=partial(print, flush=True),
+        counting=partial(counting, sys.stdout),
+        reporting=partial(reporter, sys.stdout),
+    )
+    command = f"fingers demo --out {args.out}"
+    command += f" --policy {args.policy}" if args.policy else ""
+    report = demo(args.out, policy, screen, [command])
+    print(f"report: {report}")
+    return 0

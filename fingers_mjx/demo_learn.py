@@ -1,0 +1,111 @@
+"""The learning part of the demonstration: before, the run, after, export."""
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+
+from envs.batch import BatchEnv
+from fingers_mjx.demo_screen import Screen, timed
+from fingers_mjx.evaluate import EpisodeTable
+from fingers_mjx.evaluate_source import evaluate_source
+from fingers_mjx.export import ExportReport, brax_weights
+from fingers_mjx.export_run import export_run
+from fingers_mjx.policy_source import PolicySource, load_source
+from fingers_mjx.ppo_config import TrainConfig, preset
+from fingers_mjx.ppo_state import init_train_state, make_learner
+from fingers_mjx.run_setup import Setup, identity, make_env, new_setup
+from fingers_mjx.train import train
+
+SEED = 1
+"""Of the worlds in which both policies are measured; training has seed 0."""
+
+
+@dataclass(frozen=True)
+class LearnSize:
+    """How much is learned.
+
+    Attributes:
+        train: settings of the run.
+        episodes, steps: of the evaluations before and after.
+    """
+
+    train: TrainConfig
+    episodes: int = 64
+    steps: int = 500
+
+
+@dataclass(frozen=True)
+class Learned:
+    """What learning has changed.
+
+    Attributes:
+        run_dir: of the run.
+        before, after: the same randomized worlds under the untrained policy and the
+            one of the last checkpoint.
+        trained_s: time of training, with compilation [s].
+        export: how far the exported policy is from JAX.
+    """
+
+    run_dir: Path
+    before: EpisodeTable
+    after: EpisodeTable
+    trained_s: float
+    export: ExportReport
+
+
+def default_size() -> LearnSize:
+    """Returns the run that shows learning within minutes on two cores."""
+    return LearnSize(preset("cpu"))
+
+
+def learn(out: Path, screen: Screen, size: LearnSize) -> Learned:
+    """Trains a policy, measures what it has learned and exports it.
+
+    Args:
+        out: directory in which a new run directory is made.
+        screen: where progress goes.
+        size: how much of everything.
+    """
+    setup = new_setup(size.train, None)
+    env = make_env(setup, size.train.num_envs, size.train.backend)
+    run_dir = out / time.strftime("run-%Y%m%d-%H%M%S")
+    start_s = time.monotonic()
+    with timed(screen, "4/5 learning on this machine, from nothing"):
+        _train(run_dir, setup, env, screen)
+    trained_s = time.monotonic() - start_s
+    with timed(screen, "5/5 what it has learned, and its export"):
+        before = _measure(untrained(run_dir, setup, env), screen, size)
+        after = _measure(load_source(run_dir), screen, size)
+        report = export_run(run_dir, run_dir)
+    return Learned(run_dir, before, after, trained_s, report)
+
+
+def untrained(path: Path, setup: Setup, env: BatchEnv) -> PolicySource:
+    """Returns the policy that a run starts from, up to its random numbers."""
+    learner = make_learner(env, setup.train.ppo)
+    state = init_train_state(learner, env, jax.random.key(setup.train.seed))
+    clip = setup.env.action_clip
+    weights = brax_weights(state.params.policy, state.normalizer, clip)
+    return PolicySource(path, setup, weights, 0)
+
+
+def _train(run_dir: Path, setup: Setup, env: BatchEnv, screen: Screen) -> None:
+    with screen.reporting() as show:
+        train(
+            lambda num_envs: env,
+            setup.train,
+            run_dir,
+            env_config=setup.env,
+            hand=setup.hand,
+            identity=identity(env),
+            on_progress=show,
+        )
+
+
+def _measure(source: PolicySource, screen: Screen, size: LearnSize) -> EpisodeTable:
+    with screen.counting("evaluating", "steps") as count:
+        return evaluate_source(
+            source, size.episodes, SEED, steps=size.steps, progress=count
+        )

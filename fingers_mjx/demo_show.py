@@ -1,0 +1,112 @@
+"""The showing part of the demonstration: a given policy, measured and filmed."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from fingers_deploy import Bundle
+from fingers_mjx.demo_screen import Screen, timed
+from fingers_mjx.evaluate import EpisodeTable
+from fingers_mjx.evaluate_source import (
+    document,
+    evaluate_source,
+    nominal,
+    write_evaluation,
+)
+from fingers_mjx.play import Player
+from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
+from fingers_mjx.play_video import write_video
+from fingers_mjx.policy_source import PolicySource
+from fingers_mjx.run_setup import make_env
+
+FILM = ((0.16, 0.0, 0.0), (0.10, 0.12, 0.0), (0.0, 0.0, 0.45), (0.16, 0.0, 0.0))
+"""Commands of the video: ahead, to the left, turning, ahead."""
+
+
+@dataclass(frozen=True)
+class ShowSize:
+    """How much is shown.
+
+    Attributes:
+        episodes: randomized episodes, in the environment and in C MuJoCo each.
+        steps: control steps of each; as in training if None.
+        film_s: length of the video [s].
+        fps, width: of the video.
+    """
+
+    episodes: int = 16
+    steps: int | None = None
+    film_s: float = 12.0
+    fps: float = 20.0
+    width: int = 480
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What was found out about a policy.
+
+    Attributes:
+        source: policy.
+        simulated: episodes in the environment.
+        played: the same episodes in C MuJoCo through the shim.
+        film: one episode of several commands, the nominal hand.
+        video: mp4 of it.
+    """
+
+    source: PolicySource
+    simulated: EpisodeTable
+    played: Session
+    film: Session
+    video: Path
+
+
+def show(
+    out: Path, bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
+) -> Shown:
+    """Evaluates, plays and films a policy.
+
+    Args:
+        out: directory for evaluation and video.
+        bundle: the policy for the shim.
+        source: the same for the environment.
+        screen: where progress goes.
+        size: how much of everything.
+    """
+    with timed(screen, f"1/5 {source.path} in {size.episodes} randomized episodes"):
+        simulated = _evaluate(out, source, screen, size)
+    with timed(screen, "2/5 the same episodes in C MuJoCo, through the shim"):
+        played = _play(bundle, source, screen, size)
+    with timed(screen, "3/5 a video of the nominal hand"):
+        film, video = _film(out, bundle, source, screen, size)
+    return Shown(source, simulated, played, film, video)
+
+
+def _evaluate(
+    out: Path, source: PolicySource, screen: Screen, size: ShowSize
+) -> EpisodeTable:
+    with screen.counting("evaluating", "steps") as count:
+        table = evaluate_source(source, size.episodes, steps=size.steps, progress=count)
+    summary = document(source, table, 0, {"backend": "cpu", "steps": size.steps})
+    write_evaluation(out / "evaluation", table, summary)
+    return table
+
+
+def _play(
+    bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
+) -> Session:
+    player = Player(make_env(source.setup, 1, "cpu"), bundle)
+    steps = size.steps or player.env.episode_length
+    with screen.counting("playing", "episodes") as count:
+        return play_episodes(player, size.episodes, steps, progress=count)
+
+
+def _film(
+    out: Path, bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
+) -> tuple[Session, Path]:
+    player = Player(make_env(nominal(source.setup), 1, "cpu"), bundle)
+    model, dt_s = player.env.mj_model, player.env.dt
+    steps = round(size.film_s / dt_s)
+    film = play_episodes(player, 1, steps, schedule=schedule_of(FILM, steps))
+    path = out / "walk.mp4"
+    with screen.counting("drawing", "frames") as count:
+        write_video(path, model, film.first, dt_s, size.fps, size.width, count)
+    return film, path
