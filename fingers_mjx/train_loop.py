@@ -162,6 +162,16 @@ class Loop:
         self.desk.log.append(row)
         self.desk.on_progress({"event": "progress", **row})
         self._note_fault()
+        self._note_overflow(row.get("contact_overflow", 0.0))
+
+    def _note_overflow(self, share: float) -> None:
+        """Tells when MuJoCo Warp ran out of room and dropped contacts."""
+        if share > 0.0:
+            sentence = (
+                f"contact or constraint buffers were too small in {share:.2%} of the "
+                "control steps since the last row, and contacts were dropped there"
+            )
+            self.desk.on_progress({"event": "note", "text": sentence})
 
     def _note_fault(self) -> None:
         """Tells of the latest step that was set aside, once."""

@@ -1,12 +1,15 @@
 """A tiny run on a probe, for the tests of the driver; run as a script, it trains.
 
 python train_setup.py RUN_DIR [--resume] [iterations=40 checkpoint_every=1 …]
+
+With sleep_at=N it says so, and sleeps for ever, after iteration N.
 """
 
 import dataclasses
 import json
 import os
 import sys
+import time
 from pathlib import Path
 
 from probe_envs import probe
@@ -77,11 +80,15 @@ def curve(path, *figures):
 
 def tell(event):
     print(json.dumps(event), flush=True)
+    if event["event"] == "progress" and event["iteration"] == SLEEP_AT:
+        print(json.dumps({"event": "note", "text": "asleep"}), flush=True)
+        time.sleep(3600.0)
 
 
 if __name__ == "__main__":
     given = dict(word.split("=") for word in sys.argv[2:] if "=" in word)
     numbers = {name: int(value) for name, value in given.items()}
+    SLEEP_AT = numbers.pop("sleep_at", -1)
     try:
         run(Path(sys.argv[1]), "--resume" in sys.argv, tell, **numbers)
     except Interrupted as stopped:

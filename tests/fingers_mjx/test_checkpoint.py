@@ -1,13 +1,20 @@
-"""Checkpoints: bit-equal, committed at once, damage always found, full disks named."""
+"""Checkpoints: bit-equal, committed at once, damage always found, full disks named.
+
+T2 (SIGKILL at named points), T5 (damage), T6 (full disk); X8 (what files show).
+"""
 
 import errno
 import json
+import os
 import random
 import resource
 import shutil
+import subprocess
+import sys
 from collections import namedtuple
 from pathlib import Path
 
+import checkpoint_child
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -18,18 +25,7 @@ from fingers_mjx import checkpoint, rundir_files
 from fingers_mjx.checkpoint_tree import to_host
 from fingers_mjx.train_errors import OutOfSpace
 
-POINTS = (
-    "begin",
-    "made",
-    "state written",
-    "meta written",
-    "sealed",
-    "name free",
-    "renamed",
-    "committed",
-    "hidden",
-    "deleted",
-)
+POINTS = checkpoint_child.PROTOCOL
 
 
 class Death(BaseException):
@@ -112,6 +108,30 @@ def test_sudden_death_leaves_the_newest_complete_checkpoint(tmp_path, point):
     assert not list(tmp_path.glob(".*"))
     save(tmp_path, 3)  # and the next save works
     assert checkpoint.newest(tmp_path, ignore).name == "00000003"
+
+
+@pytest.mark.parametrize("repeats", [1, pytest.param(5, marks=pytest.mark.slow)])
+def test_kill_at_any_point_leaves_the_newest_complete_checkpoint(tmp_path, repeats):
+    """The same with real processes and SIGKILL, also in the middle of writing."""
+    script = Path(checkpoint_child.__file__)
+    root = script.parents[1]
+    paths = os.pathsep.join([str(root), str(root / "deploy")])
+    subprocess.run(
+        [sys.executable, str(script), str(tmp_path), str(repeats)],
+        env=os.environ | {"JAX_PLATFORMS": "cpu", "PYTHONPATH": paths},
+        check=True,
+    )
+    trials = sorted(tmp_path.iterdir())
+    assert len(trials) == repeats * len(checkpoint_child.POINTS) == 12 * repeats
+    for trial in trials:
+        point = trial.name.rpartition("-")[0]
+        checkpoint.clean(trial)
+        newest = checkpoint.newest(trial, ignore)
+        number = int(newest.name)
+        assert number == (3 if point in POINTS[POINTS.index("renamed") :] else 2)
+        arrays = checkpoint.load(newest).arrays
+        assert_equal(arrays, to_host(checkpoint_child.state(number)))
+        assert not list(trial.glob(".*"))
 
 
 def test_points_are_all_reached(tmp_path):

@@ -1,6 +1,13 @@
-"""The driver: the same curve whatever happens on the way, and honest ends."""
+"""The driver: the same curve whatever happens on the way, and honest ends.
 
+T3 (resumed = straight), T4 (changed settings refused), T5 (damage passed over), T6
+(full disk), T8 (faults named, set aside, or ending the run), T10 (nothing compiled,
+nothing grows), T12 (same seed, same run).
+"""
+
+import resource
 from pathlib import Path
+from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -61,6 +68,11 @@ def test_resumed_run_is_bit_equal_to_a_straight_one(straight, tmp_path):
     assert any(stopped[k].tobytes() != v.tobytes() for k, v in leaves(path)[1].items())
 
 
+def test_same_seed_gives_the_same_run(straight, tmp_path):
+    run(tmp_path / "run")
+    assert_same_end(straight[0], tmp_path / "run")
+
+
 def test_another_seed_ends_elsewhere(straight, tmp_path):
     """Negative control of bit-equality."""
     run(tmp_path / "run", seed=1)
@@ -101,6 +113,7 @@ def test_resume_with_other_settings_is_refused(straight, change, field):
     ("more", "field"),
     [
         ({"identity": {"model_sha256": "ab"}}, "identity.model_sha256"),
+        ({"identity": {"joint_names": ["b", "a"]}}, "identity.joint_names"),
         ({"env_config": {"speed": 1.0}}, "env.speed"),
     ],
 )
@@ -193,6 +206,58 @@ def test_full_disk_stops_and_keeps_what_was_saved(tmp_path, monkeypatch):
     assert run(path, resume=True).iterations == 10
 
 
+def test_full_disk_of_the_curve_stops_within_one_row(tmp_path):
+    """A limit of file size, which the learning curve is the first to reach."""
+    path, limits = tmp_path / "run", resource.getrlimit(resource.RLIMIT_FSIZE)
+
+    def fill(event):
+        if event["event"] == "checkpoint" and event["iteration"] == 4:
+            room = (path / "metrics.jsonl").stat().st_size + 100
+            resource.setrlimit(resource.RLIMIT_FSIZE, (room, limits[1]))
+
+    try:
+        with pytest.raises(
+            OutOfSpace, match=r"metrics\.jsonl: needs \d+ bytes"
+        ) as full:
+            run(path, on_progress=fill, checkpoint_every=4)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+    assert full.value.exit_code == 4
+    assert leaves(path)[0] == 4
+    assert run(path, resume=True, checkpoint_every=4).iterations == 10
+    assert [row[0] for row in curve(path)] == list(range(1, 11))
+
+
+def overflowing(num_envs):
+    """A probe that tells of dropped contacts as an environment on Warp does."""
+    env = make_env(num_envs)
+
+    def with_metric(state):
+        hit = (state.data["clock"] == 5) & state.data["hit"]
+        metrics = state.metrics | {"contact_overflow": hit * 1.0}
+        return state.replace(metrics=metrics)
+
+    return SimpleNamespace(
+        num_envs=num_envs,
+        action_size=env.action_size,
+        observation_size=env.observation_size,
+        reset=lambda key: with_metric(env.reset(key)),
+        step=lambda state, action: with_metric(env.step(state, action)),
+    )
+
+
+def test_dropped_contacts_are_told(tmp_path):
+    """T9: in the row of the iteration in which it happened, and only there."""
+    events = []
+    train(
+        overflowing, train_setup.config(), tmp_path / "run", on_progress=events.append
+    )
+    kinds = [(e["event"], e.get("iteration")) for e in events]
+    notes = [i for i, e in enumerate(events) if "contacts were dropped" in str(e)]
+    assert [kinds[i - 1] for i in notes] == [("progress", 2)]
+    assert "1.56%" in events[notes[0]]["text"]  # one step of 16 worlds x 4 steps
+
+
 def poisoned(fault):
     return lambda n: probe("seen_action", n, length=3, fault=fault)
 
@@ -238,8 +303,13 @@ def test_passing_fault_of_the_update_is_skipped_and_survived(tmp_path):
     assert all(np.isfinite(v).all() for v in learned)
 
 
-@pytest.mark.parametrize("iterations", [60, pytest.param(5000, marks=pytest.mark.slow)])
-def test_no_compilation_and_no_growth_after_the_first_rows(tmp_path, iterations):
+@pytest.mark.parametrize(
+    ("iterations", "growth"),
+    [(230, 1.02), pytest.param(5000, 1.05, marks=pytest.mark.slow)],
+)
+def test_no_compilation_and_no_growth_after_the_first_rows(
+    tmp_path, iterations, growth
+):
     compiled, resident = [], []
 
     def watch(event):
@@ -253,9 +323,9 @@ def test_no_compilation_and_no_growth_after_the_first_rows(tmp_path, iterations)
         )
     )
     run(tmp_path / "run", on_progress=watch, iterations=iterations, checkpoint_every=20)
-    early, late = resident[25], resident[-1]
+    early, late = resident[30], resident[-1]
     assert late[0] == early[0] > 0
-    assert late[1] <= 1.05 * early[1]
+    assert late[1] <= growth * early[1]
 
 
 def test_state_in_memory_is_what_is_saved(straight):

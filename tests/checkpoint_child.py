@@ -1,0 +1,77 @@
+"""Saves checkpoints and kills itself at named points: python checkpoint_child.py DIR N.
+
+For each point, N times over, a forked process saves iterations 1, 2 and 3 into a
+directory of its own and takes SIGKILL at that point of the third save.
+"""
+
+import os
+import signal
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
+
+from fingers_mjx import checkpoint
+
+PROTOCOL = (
+    "begin",
+    "made",
+    "state written",
+    "meta written",
+    "sealed",
+    "name free",
+    "renamed",
+    "committed",
+    "hidden",
+    "deleted",
+)
+FILES = {"amid the arrays": "state*/**/*", "amid the manifest": "manifest.json"}
+"""Points between those of the protocol: as soon as such a file is there."""
+POINTS = (*PROTOCOL, *FILES)
+
+
+def state(number):
+    return {"a": np.arange(2**20) + number, "b": {"c": np.float32(number)}}
+
+
+def kill():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def kill_when(directory, pattern):
+    """Kills this process when a file appears in the unfinished checkpoint."""
+    while not any(p.is_file() for p in directory.glob(f".tmp-*/{pattern}")):
+        pass
+    kill()
+
+
+def save_and_die(directory, point):
+    directory.mkdir()
+    for number in (1, 2):
+        checkpoint.save(directory, number, state(number), {}, keep=2)
+    if point in FILES:
+        watch = threading.Thread(target=kill_when, args=(directory, FILES[point]))
+        watch.start()
+    at = {point: kill}
+    checkpoint.save(
+        directory, 3, state(3), {}, 2, lambda reached: at.get(reached, bool)()
+    )
+    if point in FILES:
+        watch.join()
+
+
+def main(root, repeats):
+    for point in POINTS:
+        for trial in range(repeats):
+            child = os.fork()
+            if child == 0:
+                save_and_die(root / f"{point}-{trial}", point)
+                os._exit(1)
+            _, status = os.waitpid(child, 0)
+            if not os.WIFSIGNALED(status) or os.WTERMSIG(status) != signal.SIGKILL:
+                sys.exit(f"{point}: not killed, status {status}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), int(sys.argv[2]))
