@@ -23,7 +23,8 @@ MAY_IMPORT = {
     "fingers_deploy": (),
 }
 ARRAYS = {"jax", "numpy", "jaxtyping", "flax"}
-FOREIGN = {"rewards": ARRAYS, "fingers_deploy": {"numpy", "onnxruntime"}}
+ROBOT = {"numpy", "onnxruntime", "wujihandpy", "mujoco"}  # mujoco: in its simulator
+FOREIGN = {"rewards": ARRAYS, "fingers_deploy": ROBOT}
 """Third parties of the packages that are used far from a simulator."""
 
 

@@ -28,7 +28,7 @@ class PolicyController:
     def __init__(self, bundle: Bundle, runtime: Runtime = "auto"):
         self.bundle = bundle
         self._policy = load_policy(bundle, runtime)
-        self._assembler = ObservationAssembler(bundle.manifest.interface)
+        self.assembler = ObservationAssembler(bundle.manifest.interface)
         self._transform = ActionTransform(bundle.manifest.interface)
         self.reset()
 
@@ -60,6 +60,23 @@ class PolicyController:
         self.faults = 0
         self._history: History | None = None
 
+    def resume(
+        self, history: History | None, action: ArrayLike, target_rad: ArrayLike
+    ) -> None:
+        """Goes on from a history, e.g. of another policy (`behaviour.hand_over`).
+
+        Args:
+            history: observation history up to the last control step.
+            action: clipped policy output of that step, [20].
+            target_rad: targets on the wire, [20].
+
+        Raises:
+            ValueError: targets of another shape or not finite.
+        """
+        self.reset(target_rad)
+        self._history = history
+        self.action = self._transform.clip_action(action)
+
     def step(
         self,
         joint_pos: ArrayLike,
@@ -78,13 +95,13 @@ class PolicyController:
         Raises:
             ValueError: an argument of another shape.
         """
-        sample = self._assembler.sample(
+        sample = self.assembler.sample(
             joint_pos, gravity_b, angvel_b, self.action, command
         )
         if not all(np.all(np.isfinite(value)) for value in sample):
             return self._hold("non-finite measurement")
-        history = self._assembler.update(self._history, sample)
-        observation = self._assembler.flatten(history)
+        history = self.assembler.update(self._history, sample)
+        observation = self.assembler.flatten(history)
         action = self._policy(observation)
         if not np.all(np.isfinite(action)):
             return self._hold("non-finite policy output")

@@ -2,6 +2,7 @@
 
 import dataclasses
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,7 +103,7 @@ class Limits:
         return dataclasses.replace(self, frozen_joints_s=_NEVER, tracking_s=_NEVER)
 
 
-def make_limits(manifest: Manifest, factory_rad: Array, **changes: float) -> Limits:
+def make_limits(manifest: Manifest, factory_rad: Array, **changes: Any) -> Limits:
     """Limits for a bundle on a hand.
 
     Args:
@@ -121,7 +122,7 @@ def make_limits(manifest: Manifest, factory_rad: Array, **changes: float) -> Lim
     trained = np.asarray(interface.joint_limits_rad, np.float64)
     allowed = intersect(trained, factory_rad, interface.joint_names)
     rest = np.asarray(interface.initial_target_rad, np.float64)
-    return Limits(
+    limits = Limits(
         trained_rad=trained,
         factory_rad=factory_rad,
         allowed_rad=allowed,
@@ -132,8 +133,8 @@ def make_limits(manifest: Manifest, factory_rad: Array, **changes: float) -> Lim
         max_roll_rad=float(np.deg2rad(roll)),
         max_pitch_rad=float(np.deg2rad(pitch)),
         tilt_s=tilt_s,
-        **changes,  # pyright: ignore[reportArgumentType]
     )
+    return dataclasses.replace(limits, **changes)
 
 
 def intersect(trained: Array, factory: Array, names: tuple[str, ...]) -> Array:

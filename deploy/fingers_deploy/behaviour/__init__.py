@@ -1,0 +1,1 @@
+"""Behaviours: where commands come from, and which policy runs."""

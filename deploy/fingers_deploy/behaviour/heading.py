@@ -1,0 +1,50 @@
+"""Heading hold: yaw-rate command from the IMU's heading."""
+
+from dataclasses import dataclass
+
+from fingers_deploy.rotations import wrap
+
+_TURNING = 0.02  # a commanded rate above this steers, below it the heading is held
+
+
+@dataclass(frozen=True)
+class HeadingConfig:
+    """Gains of the heading hold.
+
+    Attributes:
+        gain: yaw rate per heading error [1/s].
+        offset_rad_s: added to the commanded rate, against a constant drift.
+        low, high: training range of the yaw-rate command [rad/s].
+    """
+
+    gain: float
+    offset_rad_s: float
+    low: float
+    high: float
+
+
+def heading_step(
+    reference_rad: float | None,
+    heading_rad: float,
+    asked_rad_s: float,
+    c: HeadingConfig,
+) -> tuple[float | None, float]:
+    """One step: ω = clip(k·wrap(ψ_ref − ψ) + ω₀, low, high).
+
+    While the operator turns, his rate passes with the offset, and the reference follows
+    the heading: the hand goes on in the direction in which he lets go.
+
+    Args:
+        reference_rad: heading that is held; None before the first step.
+        heading_rad: measured heading of V.
+        asked_rad_s: the operator's yaw rate.
+        c: the gains.
+
+    Returns:
+        The new reference, and the yaw-rate command [rad/s].
+    """
+    if reference_rad is None or abs(asked_rad_s) > _TURNING:
+        rate = asked_rad_s + c.offset_rad_s
+        return heading_rad, min(max(rate, c.low), c.high)
+    rate = c.gain * wrap(reference_rad - heading_rad) + c.offset_rad_s
+    return reference_rad, min(max(rate, c.low), c.high)

@@ -1,0 +1,131 @@
+"""The operator's console: typed actions in, plain lines out."""
+
+import select
+import signal
+import sys
+import time
+from collections.abc import Mapping
+from typing import Any
+
+from fingers_deploy.runtime.launcher import EXIT_PREFLIGHT, Launcher
+
+HELP = "type: arm, stop, clear, policy N, status, quit"
+_RETRY_S = 0.5
+_ARM_WITHIN_S = 15.0
+
+
+def drive(options: Mapping[str, Any], arm: bool, duration_s: float | None) -> int:
+    """Runs until the operator quits or the time is over.
+
+    Args:
+        options: of `runtime.launcher.Launcher`.
+        arm: arm at once, as soon as everything is ready.
+        duration_s: quit after so long [s]; None: never.
+
+    Returns:
+        The exit status.
+    """
+    launcher = Launcher(options, _say)
+    return Console(launcher, arm, duration_s).run()
+
+
+def _say(line: str) -> None:
+    print(line, flush=True)
+
+
+class Console:
+    """One session at the console.
+
+    Args:
+        launcher: of the run.
+        arm: arm as soon as everything is ready.
+        duration_s: quit after so long [s]; None: never.
+    """
+
+    def __init__(self, launcher: Launcher, arm: bool, duration_s: float | None):
+        self._launcher, self._arm = launcher, arm
+        self._start_s = self._asked_s = time.monotonic()
+        self._duration_s = duration_s
+        self._armed = self._quitting = False
+        self._input_open = True
+
+    def run(self) -> int:
+        """Serves the operator until the run is over; returns the exit status."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: self._quit())
+        if not self._arm:
+            _say(HELP)
+        while self._launcher.poll(0.05):
+            self._read_input()
+            self._step()
+        status = self._launcher.finish()
+        self._report()
+        return (
+            EXIT_PREFLIGHT if status == 0 and self._arm and not self._armed else status
+        )
+
+    def _step(self) -> None:
+        now, mode = time.monotonic(), self._launcher.status.get("mode")
+        self._armed = self._armed or mode == "active"
+        if self._arm and mode == "disabled" and not self._armed:
+            if now - self._start_s > _ARM_WITHIN_S:
+                self._quit()
+            elif now - self._asked_s > _RETRY_S:
+                self._asked_s = now
+                self._launcher.send("arm")
+        if self._duration_s is not None and now - self._start_s > self._duration_s:
+            self._quit()
+        if self._arm and self._armed and mode == "safe":
+            self._quit()
+
+    def _quit(self) -> None:
+        if not self._quitting:
+            self._quitting = True
+            self._launcher.send("quit")
+
+    def _read_input(self) -> None:
+        if not self._input_open or not select.select([sys.stdin], [], [], 0)[0]:
+            return
+        line = sys.stdin.readline()
+        if not line:
+            self._input_open = False
+            if sys.stdin.isatty():
+                self._quit()
+            return
+        word = " ".join(line.split())
+        if word == "status":
+            self._report()
+        elif word == "quit":
+            self._quit()
+        elif word in ("arm", "stop", "clear") or _selects(word):
+            self._launcher.send(word)
+            if word == "arm":
+                time.sleep(0.1)
+        elif word:
+            _say(HELP)
+
+    def _report(self) -> None:
+        status = self._launcher.status
+        if not status:
+            return
+        _say(f"mode {status['mode']}, {status['realtime']}")
+        for line in status["faults"]:
+            _say(f"  fault {line}")
+        for name, passed, found in status["checks"]:
+            _say(f"  {'ok  ' if passed else 'FAIL'} {name}: {found}")
+        timing = status["timing"]
+        _say(
+            f"  {timing['control_steps']} control steps, {timing['skipped']} skipped, "
+            f"{timing['late_over_5ms']} more than 5 ms late; late "
+            f"{timing['late_p50_ms']:.1f} / {timing['late_p999_ms']:.1f} / "
+            f"{timing['late_max_ms']:.1f} ms (50 %, 99.9 %, worst)"
+        )
+        if status["recording_error"]:
+            _say(f"  NOT RECORDING: {status['recording_error']}")
+        elif status["recording"]:
+            _say(f"  recording {status['recording']}")
+
+
+def _selects(word: str) -> bool:
+    name, _, number = word.partition(" ")
+    return name == "policy" and number.isdigit()

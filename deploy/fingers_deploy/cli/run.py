@@ -1,0 +1,165 @@
+"""`fingers-deploy run | record | guard`: from options to a run at the console."""
+
+import argparse
+import contextlib
+from typing import Any
+
+from fingers_deploy.bundle import load_bundle
+from fingers_deploy.cli.console import drive
+from fingers_deploy.drivers.open import KINDS, open_driver
+from fingers_deploy.drivers.sim import SimulatorProcess
+from fingers_deploy.errors import InputError
+from fingers_deploy.manifest import JOINT_COUNT
+from fingers_deploy.runtime.guard import make_safe
+
+WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
+
+
+def add_run(commands: Any) -> None:
+    """Adds the command `run`."""
+    parser = commands.add_parser("run", help="run policies on a hand")
+    parser.add_argument("bundles", nargs="+", help="folders or ONNX files")
+    _add_driver(parser)
+    _add_loop(parser)
+    parser.add_argument("--runtime", default="auto", help="auto, onnxruntime or numpy")
+    parser.add_argument("--joystick", metavar="DEVICE", help="e.g. /dev/input/js0")
+    parser.add_argument(
+        "--sticks", type=float, nargs="*", default=[], help="fixed sticks, −1 to 1"
+    )
+    parser.add_argument(
+        "--heading-hold",
+        type=float,
+        nargs=2,
+        metavar=("GAIN", "OFFSET"),
+        help="hold the heading: gain [1/s], constant yaw rate [rad/s]",
+    )
+    parser.set_defaults(command=run, plan=None)
+
+
+def add_record(commands: Any) -> None:
+    """Adds the command `record`."""
+    parser = commands.add_parser(
+        "record", help="record a hand at rest, or while it follows a plan of targets"
+    )
+    parser.add_argument("bundles", nargs=1, help="bundle with the hand's joints")
+    parser.add_argument("--plan", metavar="CSV", help="columns t and cmd.<joint>")
+    _add_driver(parser)
+    _add_loop(parser)
+    parser.set_defaults(
+        command=run, runtime="numpy", joystick=None, sticks=[], heading_hold=None
+    )
+
+
+def add_guard(commands: Any) -> None:
+    """Adds the command `guard`."""
+    parser = commands.add_parser("guard", help="de-energize a hand, nothing else")
+    parser.add_argument("bundles", nargs=1, help="bundle with the hand's joints")
+    _add_driver(parser)
+    parser.set_defaults(command=guard)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs or records; returns the exit status."""
+    _check(options)
+    # Refused here, before any process starts and any device is opened.
+    bundles = [load_bundle(path) for path in options.bundles]
+    driver = _driver(options)
+    with contextlib.ExitStack() as stack:
+        if options.driver == "sim" and not options.socket:
+            interface = bundles[0].manifest.interface
+            simulator = SimulatorProcess(options.model, interface, seed=options.seed)
+            driver["socket"] = stack.enter_context(simulator).path
+        heading = options.heading_hold
+        plain = {
+            "bundles": options.bundles,
+            "driver": driver,
+            "loop_hz": options.loop_hz,
+            "record": None if options.no_record else options.out,
+            "mounting": options.mounting,
+            "wiggle": WIGGLES[options.wiggle],
+            "runtime": options.runtime,
+            "joystick": options.joystick,
+            "sticks": options.sticks,
+            "plan": options.plan,
+            "heading_hold": heading
+            and {"gain": heading[0], "offset_rad_s": heading[1]},
+        }
+        return drive(plain, options.arm, options.duration)
+
+
+def guard(options: argparse.Namespace) -> int:
+    """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
+    interface = load_bundle(options.bundles[0]).manifest.interface
+    try:
+        driver = open_driver(_driver(options), interface)
+    except OSError as error:
+        print(f"no hand: {error}")
+        return 5
+    safe = make_safe(driver)
+    driver.close()
+    print("de-energized, confirmed" if safe else "NOT CONFIRMED: CUT THE BATTERY")
+    return 0 if safe else 5
+
+
+def _add_driver(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("driver")
+    group.add_argument("--driver", choices=KINDS, required=True)
+    group.add_argument("--dry-run", action="store_true", help="never energize")
+    group.add_argument("--model", help="sim: MJCF or MJB file of the hand")
+    group.add_argument("--socket", help="sim: of a simulator that runs already")
+    group.add_argument("--seed", type=int, default=0, help="sim: of the sensor noise")
+    group.add_argument("--log", help="replay: MCAP file of a run")
+    group.add_argument("--side", choices=("right", "left"), default="right")
+    group.add_argument("--serial", help="wuji: serial number of the hand")
+    group.add_argument("--imu-bus", type=int, default=1, help="wuji: I²C bus")
+    group.add_argument("--imu-address", type=int, default=0x4A, help="wuji")
+    group.add_argument(
+        "--imu-mount",
+        type=float,
+        nargs=4,
+        default=[1.0, 0.0, 0.0, 0.0],
+        metavar=("W", "X", "Y", "Z"),
+        help="wuji: orientation of the IMU in the palm frame",
+    )
+
+
+def _add_loop(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("loop")
+    group.add_argument("--loop-hz", type=float, default=500.0)
+    group.add_argument("--wiggle", choices=tuple(WIGGLES), default="all")
+    group.add_argument("--out", default=".", help="folder of the recording")
+    group.add_argument("--no-record", action="store_true")
+    group.add_argument("--mounting", choices=("free", "palm_fixed"), default="free")
+    group.add_argument(
+        "--arm",
+        action="store_true",
+        help="arm at once; only in simulation, replay and dry runs",
+    )
+    group.add_argument("--duration", type=float, help="stop after so many seconds")
+
+
+def _driver(options: argparse.Namespace) -> dict[str, Any]:
+    return {
+        "kind": options.driver,
+        "dry_run": options.dry_run,
+        "socket": options.socket,
+        "log": options.log,
+        "side": options.side,
+        "serial": options.serial,
+        "imu_bus": options.imu_bus,
+        "imu_address": options.imu_address,
+        "imu_mount": options.imu_mount,
+    }
+
+
+def _check(options: argparse.Namespace) -> None:
+    kind = options.driver
+    if kind == "sim" and not (options.model or options.socket):
+        raise InputError("--driver sim", "", "no model", "--model FILE or --socket")
+    if kind == "replay" and not options.log:
+        raise InputError("--driver replay", "", "no log", "--log FILE")
+    if options.arm and kind == "wuji" and not options.dry_run:
+        valid = "typing arm at the console"
+        raise InputError("--arm", "", "a real hand", valid)
+    if not 50.0 <= options.loop_hz <= 1000.0:
+        raise InputError("--loop-hz", "", options.loop_hz, "50 to 1000")

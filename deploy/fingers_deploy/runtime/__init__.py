@@ -1,0 +1,1 @@
+"""Processes, clocks and links: what runs a policy on a hand."""

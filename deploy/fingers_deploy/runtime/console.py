@@ -1,0 +1,55 @@
+"""Messages between the console and the supervisor's process."""
+
+import json
+import socket
+from typing import Any
+
+from fingers_deploy.safety.types import Operator
+
+_LONGEST = 65536
+ACTIONS = {"arm": Operator.ARM, "stop": Operator.STOP, "clear": Operator.CLEAR}
+
+
+class ConsoleLink:
+    """The supervisor's end: actions in, status out; never blocks.
+
+    Args:
+        end: the socket.
+    """
+
+    def __init__(self, end: socket.socket):
+        self._socket = end
+        end.setblocking(False)
+        self.quitting = False
+        self.selected: int | None = None
+
+    def poll(self) -> Operator:
+        """Returns the newest action.
+
+        A console that is gone counts as an operator who wants to stop and quit.
+        """
+        action = Operator.NONE
+        while True:
+            try:
+                data = self._socket.recv(_LONGEST)
+            except BlockingIOError:
+                return action
+            except OSError:
+                data = b""
+            if not data:
+                self.quitting = True
+                return Operator.STOP
+            word = data.decode("ascii", "replace")
+            if word == "quit":
+                self.quitting, action = True, Operator.STOP
+            elif word.startswith("policy "):
+                self.selected = int(word.removeprefix("policy "))
+            else:
+                action = ACTIONS.get(word, action)
+
+    def tell(self, status: dict[str, Any]) -> None:
+        """Sends a status; one for which there is no room is lost."""
+        try:
+            self._socket.send(json.dumps(status).encode("ascii"))
+        except OSError:
+            return

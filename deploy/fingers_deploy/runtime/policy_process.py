@@ -1,0 +1,99 @@
+"""The policy's process: observations in, proposals out, nothing else."""
+
+import json
+import select
+import socket
+import sys
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from fingers_deploy.behaviour.command import CommandSource, FixedCommand
+from fingers_deploy.behaviour.heading import HeadingConfig
+from fingers_deploy.behaviour.joystick import Joystick
+from fingers_deploy.behaviour.plan import Plan, read_plan
+from fingers_deploy.behaviour.policies import Policies
+from fingers_deploy.bundle import load_bundle
+from fingers_deploy.controller import PolicyController
+from fingers_deploy.errors import InputError
+from fingers_deploy.runtime.link import OBSERVATION
+from fingers_deploy.runtime.realtime import PRIORITY, prefer_this_process
+from fingers_deploy.runtime.signals import ignore_interrupts
+
+_IDLE_S = 1.0
+
+
+def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
+    """Makes policies and command source from plain options.
+
+    Args:
+        options: `bundles` (paths), `runtime`, `sticks` (fixed positions) or `joystick`
+            (device), `heading_hold` (gain and offset) or None; `plan` (file of targets
+            that are played in the place of a policy) or None.
+
+    Raises:
+        InputError: a bundle or a device is refused.
+    """
+    if options.get("plan"):
+        interface = load_bundle(options["bundles"][0]).manifest.interface
+        return Plan(read_plan(options["plan"], interface), interface)
+    controllers = tuple(
+        PolicyController(load_bundle(path), options["runtime"])
+        for path in options["bundles"]
+    )
+    source: CommandSource
+    if options.get("joystick"):
+        source = Joystick(options["joystick"])
+    else:
+        source = FixedCommand(tuple(options.get("sticks") or ()))
+    ranges = controllers[0].bundle.manifest.interface.command_ranges
+    hold = options.get("heading_hold")
+    config = None
+    if hold is not None and len(ranges) == 3:
+        low, high = ranges[2]
+        config = HeadingConfig(hold["gain"], hold["offset_rad_s"], low, high)
+    return Policies(controllers, source, config)
+
+
+def serve(link: socket.socket, policies: Policies | Plan) -> None:
+    """Answers the newest observation until the supervisor goes away."""
+    link.setblocking(False)
+    while True:
+        select.select([link], [], [], _IDLE_S)
+        newest = b""
+        while True:
+            try:
+                data = link.recv(OBSERVATION.itemsize)
+            except BlockingIOError:
+                break
+            if len(data) != OBSERVATION.itemsize:
+                return
+            newest = data
+        if newest:
+            answer = policies.answer(np.frombuffer(newest, OBSERVATION)[0])
+            try:
+                link.send(answer)
+            except BlockingIOError:
+                continue  # the supervisor does not read: it will miss the lease
+            except OSError:
+                return
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Runs the process: options as JSON and the number of the link's socket."""
+    text, handle = sys.argv[1:] if arguments is None else arguments
+    ignore_interrupts()
+    link = socket.socket(fileno=int(handle))
+    try:
+        policies = make_policies(json.loads(text))
+    except InputError as error:
+        print(error, file=sys.stderr)
+        return 2
+    prefer_this_process(PRIORITY - 10)
+    serve(link, policies)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

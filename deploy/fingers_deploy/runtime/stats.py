@@ -1,0 +1,86 @@
+"""Timing of a loop, in a fixed amount of memory."""
+
+import numpy as np
+
+LATE_S = 0.005
+_BIN_S = 1e-4
+_BINS = 1000  # up to 100 ms; the last bin takes what is longer
+_WINDOW = 500  # control steps of the rate that is warned about: 10 s
+WARN_SHARE = 0.01
+
+
+class Timing:
+    """Histogram of one duration, and its worst case."""
+
+    def __init__(self) -> None:
+        self._counts = np.zeros(_BINS + 1, np.int64)
+        self.worst_s = 0.0
+
+    def add(self, duration_s: float) -> None:
+        """Adds a duration [s]; negative counts as zero."""
+        place = min(max(int(duration_s / _BIN_S), 0), _BINS)
+        self._counts[place] += 1
+        self.worst_s = max(self.worst_s, duration_s)
+
+    @property
+    def count(self) -> int:
+        """Number of durations."""
+        return int(self._counts.sum())
+
+    def quantile(self, share: float) -> float:
+        """Upper edge of the bin in which the share is reached [s]; NaN if empty."""
+        total = self._counts.cumsum()
+        if not total[-1]:
+            return float("nan")
+        return float(np.searchsorted(total, share * total[-1]) + 1) * _BIN_S
+
+    def above(self, limit_s: float) -> int:
+        """How many durations were longer than a multiple of 0.1 ms."""
+        return int(self._counts[round(limit_s / _BIN_S) :].sum())
+
+
+class LoopStats:
+    """Timing of the control steps.
+
+    Attributes:
+        late: start of a step after its deadline.
+        work: duration of a step.
+        answer: observation sent to proposal received.
+        skipped: control steps that were given up.
+    """
+
+    def __init__(self) -> None:
+        self.late, self.work, self.answer = Timing(), Timing(), Timing()
+        self.skipped = 0
+        self._recent = np.zeros(_WINDOW, bool)
+        self._steps = 0
+
+    def step(self, late_s: float, skipped: int) -> None:
+        """Adds a control step."""
+        self.late.add(late_s)
+        self.skipped += skipped
+        self._recent[self._steps % _WINDOW] = late_s > LATE_S or skipped > 0
+        self._steps += 1
+
+    @property
+    def warning(self) -> bool:
+        """More than 1 % of the last 500 control steps were late or skipped."""
+        return bool(self._recent.mean() > WARN_SHARE)
+
+    def summary(self) -> dict[str, float]:
+        """Numbers for log and status, times in ms."""
+        late = self.late
+        return {
+            "control_steps": late.count,
+            "skipped": self.skipped,
+            "late_over_5ms": late.above(LATE_S),
+            "late_p50_ms": 1e3 * late.quantile(0.5),
+            "late_p99_ms": 1e3 * late.quantile(0.99),
+            "late_p999_ms": 1e3 * late.quantile(0.999),
+            "late_max_ms": 1e3 * late.worst_s,
+            "work_p50_ms": 1e3 * self.work.quantile(0.5),
+            "work_max_ms": 1e3 * self.work.worst_s,
+            "answer_p50_ms": 1e3 * self.answer.quantile(0.5),
+            "answer_p999_ms": 1e3 * self.answer.quantile(0.999),
+            "answer_max_ms": 1e3 * self.answer.worst_s,
+        }
