@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 
 from envs.hand.figures import figures
 from envs.hand.model import PALM, PAYLOAD, V_SITE
-from envs.hand.spec import OTHER_LINKS, TIP_LINKS, TIP_SITES, HandSpec
+from envs.hand.spec import OTHER_LINKS, TIP_SITES, TIP_SPHERES, HandSpec
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.rotations import multiply, rotate, unrotate
 
@@ -165,9 +165,9 @@ def _tip_signals(spec: HandSpec, sensors: Float[Array, " n"]) -> dict[str, Array
 
 
 def _tip_force(spec: HandSpec, sensors: Float[Array, " n"]) -> Float[Array, "5"]:
-    """Magnitude of the net floor force on each tip [N], over both contact slots."""
-    slots = _stack(spec, sensors, "force", TIP_LINKS).reshape(5, 2, 3)
-    return jnp.sqrt(jnp.sum(jnp.sum(slots, axis=1) ** 2, axis=-1))
+    """Magnitude of the floor's force on each tip [N]."""
+    force = _stack(spec, sensors, "force", TIP_SPHERES)
+    return jnp.sqrt(jnp.sum(force**2, axis=-1))
 
 
 def _touching(

@@ -1,8 +1,11 @@
 """The MuJoCo model of the hand: primitives from the figures, sensors for the signals.
 
 Geometry is our own: one capsule per finger link (link 1 is inside the palm's reach and
-carries none), a box for the palm and one for the dorsal module. Everything that two
-hands may differ in comes from the hand file.
+carries none), a box for the palm and one for the dorsal module. A fingertip meets the
+floor with a sphere, the end of its capsule: the sides of MuJoCo's friction pyramid lie
+along a capsule that stands up in C MuJoCo and along the world's axes in MJX and Warp,
+which for a sphere do the same as C. Everything that two hands may differ in comes from
+the hand file.
 """
 
 import numpy as np
@@ -14,7 +17,9 @@ from envs.quiet_mujoco import mujoco
 PHYSICS_DT_S = 0.005
 FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"
 V_SITE = "control_frame"
-TIP_LINK = 4
+
+# Contact groups as bits: what stands on the floor, and what the hand meets otherwise.
+_FLOOR_BIT, _HAND_BIT = 1, 2
 
 _COLOURS = {
     "thumb": (0.80, 0.40, 0.00, 1.0),
@@ -76,6 +81,8 @@ def _add_floor(spec: mujoco.MjSpec, hand: HandFile) -> None:
         size=[0, 0, 0.05],
         friction=[hand.link_friction.value, 0.005, 0.0001],
         condim=3,
+        contype=_FLOOR_BIT,
+        conaffinity=0,
         rgba=[0.92, 0.92, 0.90, 1],
     )
 
@@ -130,6 +137,8 @@ def _add_box(body, name, pos, half, rgba, hand) -> None:
         rgba=rgba,
         mass=0,
         condim=3,
+        contype=_HAND_BIT,
+        conaffinity=_HAND_BIT | _FLOOR_BIT,
         priority=1,
         friction=[hand.link_friction.value, 0.005, 0.0001],
     )
@@ -138,7 +147,6 @@ def _add_box(body, name, pos, half, rgba, hand) -> None:
 def _add_link(
     parent: mujoco.MjsBody, link: Link, index: int, hand: HandFile
 ) -> mujoco.MjsBody:
-    finger, number = FINGERS[index // 4], index % 4 + 1
     body = parent.add_body(
         name=link.body,
         pos=link.pos,
@@ -158,22 +166,42 @@ def _add_link(
         armature=link.armature,
     )
     if link.capsule:
-        start, end, radius = link.capsule
-        friction = hand.tip_friction if number == TIP_LINK else hand.link_friction
-        body.add_geom(
-            name=link.body,
-            type=mujoco.mjtGeom.mjGEOM_CAPSULE,
-            fromto=[*start, *end],
-            size=[radius, 0, 0],
-            mass=0,
-            condim=3,
-            priority=1,
-            friction=[friction.value, 0.005, 0.0001],
-            rgba=_COLOURS[finger],
-        )
-    if link.tip:
-        body.add_site(name=f"{finger}_tip", pos=link.tip, size=[0.002])
+        _add_capsule(body, link, FINGERS[index // 4], hand)
     return body
+
+
+def _add_capsule(body: mujoco.MjsBody, link: Link, finger: str, hand: HandFile) -> None:
+    """Adds the capsule of a link; on a fingertip also its sphere and its site."""
+    assert link.capsule is not None
+    start, end, radius = link.capsule
+    friction = (hand.tip_friction if link.tip else hand.link_friction).value
+    common = {
+        "mass": 0,
+        "condim": 3,
+        "priority": 1,
+        "friction": [friction, 0.005, 0.0001],
+        "rgba": _COLOURS[finger],
+    }
+    body.add_geom(
+        name=link.body,
+        type=mujoco.mjtGeom.mjGEOM_CAPSULE,
+        fromto=[*start, *end],
+        size=[radius, 0, 0],
+        contype=_HAND_BIT,
+        conaffinity=_HAND_BIT if link.tip else _HAND_BIT | _FLOOR_BIT,
+        **common,
+    )
+    if link.tip:
+        body.add_geom(
+            name=f"{link.body}_tip",
+            type=mujoco.mjtGeom.mjGEOM_SPHERE,
+            pos=end,
+            size=[radius, 0, 0],
+            contype=0,
+            conaffinity=_FLOOR_BIT,
+            **common,
+        )
+        body.add_site(name=f"{finger}_tip", pos=link.tip, size=[0.002])
 
 
 def _add_drive(spec: mujoco.MjSpec, link: Link, index: int, hand: HandFile) -> None:
@@ -232,7 +260,7 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
         )
     for link in figures().links:
         if link.tip:
-            _add_contact_sensor(spec, link.body, force=True)
+            _add_contact_sensor(spec, f"{link.body}_tip", force=True)
     for link in figures().links:
         if link.capsule and not link.tip:
             _add_contact_sensor(spec, link.body, force=False)
@@ -241,10 +269,9 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
 
 
 def _add_contact_sensor(spec: mujoco.MjSpec, geom: str, force: bool) -> None:
-    """Adds the contact forces with the floor, or the number of such contacts.
+    """Adds the contact force with the floor, or the number of contacts with it.
 
-    A capsule meets a plane in at most two points, so two slots hold all forces; MJX
-    offers no net force, the signals add the slots (same frame: the floor's normal).
+    A sphere meets a plane in one point, so the force of one contact is all of it.
     """
     data = mujoco.mjtConDataField
     field = data.mjCONDATA_FORCE if force else data.mjCONDATA_FOUND
@@ -256,5 +283,5 @@ def _add_contact_sensor(spec: mujoco.MjSpec, geom: str, force: bool) -> None:
         objname=geom,
         reftype=mujoco.mjtObj.mjOBJ_GEOM,
         refname=FLOOR,
-        intprm=[1 << int(field), mindist, 2 if force else 1],
+        intprm=[1 << int(field), mindist, 1],
     )

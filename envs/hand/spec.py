@@ -11,6 +11,7 @@ from envs.hand.model import PALM, PAYLOAD
 
 TIP_SITES = tuple(f"{finger}_tip" for finger in FINGERS)
 TIP_LINKS = tuple(link.body for link in figures().links if link.tip)
+TIP_SPHERES = tuple(f"{link}_tip" for link in TIP_LINKS)
 OTHER_LINKS = tuple(
     link.body for link in figures().links if link.capsule and not link.tip
 )
@@ -23,7 +24,7 @@ class HandSpec:
     Attributes:
         sensors: sensor name to its slice of `sensordata`.
         palm_body, payload_body: body ids.
-        tip_geoms: geom ids of the five fingertips.
+        tip_geoms: geom ids of the five fingertips, spheres and capsules.
         joint_range_rad: limits of the 20 joints (20 × 2).
     """
 
@@ -48,6 +49,6 @@ def hand_spec(model: mujoco.MjModel) -> HandSpec:
         },
         palm_body=model.body(PALM).id,
         payload_body=model.body(PAYLOAD).id,
-        tip_geoms=tuple(model.geom(link).id for link in TIP_LINKS),
+        tip_geoms=tuple(model.geom(name).id for name in TIP_SPHERES + TIP_LINKS),
         joint_range_rad=model.jnt_range[model.jnt_type != mujoco.mjtJoint.mjJNT_FREE],
     )

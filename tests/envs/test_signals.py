@@ -11,7 +11,7 @@ import pytest
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, V_SITE, build_model
-from envs.hand.spec import OTHER_LINKS, TIP_LINKS, hand_spec
+from envs.hand.spec import OTHER_LINKS, TIP_SPHERES, hand_spec
 from envs.hand.stance import load_stance
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.signals import Command, extract_signals, tilt
@@ -134,7 +134,7 @@ def floor_force(data, geom):
 
 def test_tip_forces_are_those_of_the_contact_list(moving):
     signals = read(moving)
-    expected = [np.linalg.norm(floor_force(moving, link)) for link in TIP_LINKS]
+    expected = [np.linalg.norm(floor_force(moving, link)) for link in TIP_SPHERES]
     np.testing.assert_allclose(signals.tip_force_n, expected, rtol=1e-5, atol=1e-6)
     assert np.max(expected) > 1.0
 
@@ -144,7 +144,7 @@ def test_at_rest_the_tips_carry_the_weight():
     data.qpos[:], data.ctrl[:] = STANCE.qpos, STANCE.target_rad
     mujoco.mj_step(MODEL, data, 400)
     read(data)
-    lifted = sum(abs(floor_force(data, link)[2]) for link in TIP_LINKS)
+    lifted = sum(abs(floor_force(data, link)[2]) for link in TIP_SPHERES)
     assert lifted == pytest.approx(MODEL.body_subtreemass[1] * 9.81, rel=1e-3)
 
 
@@ -216,7 +216,7 @@ def test_heading_and_place_change_nothing_in_v(moving):
 
 
 def test_names_follow_the_order_of_the_figures():
-    assert len(OTHER_LINKS) == 10 and len(TIP_LINKS) == 5
+    assert len(OTHER_LINKS) == 10 and len(TIP_SPHERES) == 5
     assert [link.joint for link in figures().links] == [
         MODEL.actuator(i).name for i in range(20)
     ]

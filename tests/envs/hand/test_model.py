@@ -5,8 +5,14 @@ import pytest
 from envs.config import override
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import load_hand_file
-from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
-from envs.hand.spec import OTHER_LINKS, TIP_LINKS, TIP_SITES, hand_spec
+from envs.hand.model import FLOOR, PALM, PAYLOAD, build_model, build_spec
+from envs.hand.spec import (
+    OTHER_LINKS,
+    TIP_LINKS,
+    TIP_SITES,
+    TIP_SPHERES,
+    hand_spec,
+)
 from envs.hand.stance import load_stance
 
 HAND = load_hand_file()
@@ -79,19 +85,43 @@ def test_the_hand_file_reaches_the_model():
     friction = {
         MODEL.geom(g).name: other.geom_friction[g, 0] for g in range(other.ngeom)
     }
-    assert {friction[name] for name in TIP_LINKS} == {0.9}
+    assert {friction[name] for name in TIP_LINKS + TIP_SPHERES} == {0.9}
     assert {friction[name] for name in (*OTHER_LINKS, PALM, PAYLOAD)} == {0.4}
 
 
-def test_geometry_is_primitive_and_every_tip_is_a_capsule():
+def test_geometry_is_primitive_and_a_tip_is_the_end_of_its_capsule():
+    kinds = mujoco.mjtGeom
     assert MODEL.nmesh == 0
-    capsule = mujoco.mjtGeom.mjGEOM_CAPSULE
-    assert all(MODEL.geom(name).type[0] == capsule for name in TIP_LINKS)
-    # The tip's centre is the capsule's far end.
-    for link in figures().links:
-        if link.tip:
-            assert link.capsule is not None
-            np.testing.assert_allclose(link.tip, link.capsule[1], atol=2e-3)
+    for link, sphere in zip(TIP_LINKS, TIP_SPHERES, strict=True):
+        capsule, tip = MODEL.geom(link), MODEL.geom(sphere)
+        assert capsule.type[0] == kinds.mjGEOM_CAPSULE
+        assert tip.type[0] == kinds.mjGEOM_SPHERE
+        axis = np.zeros(9)
+        mujoco.mju_quat2Mat(axis, capsule.quat)
+        half = axis.reshape(3, 3)[:, 2] * capsule.size[1]
+        ends = capsule.pos + np.array([half, -half])
+        assert np.linalg.norm(ends - tip.pos, axis=1).min() < 1e-9
+        assert tip.size[0] == capsule.size[0]
+    sites = [MODEL.site(name).pos for name in TIP_SITES]
+    np.testing.assert_allclose(sites, [MODEL.geom(s).pos for s in TIP_SPHERES])
+
+
+def collide(one, other):
+    a, b = MODEL.geom(one), MODEL.geom(other)
+    bits = (a.contype & b.conaffinity) | (b.contype & a.conaffinity)
+    return bool(bits[0])
+
+
+def test_what_may_touch_what():
+    """A tip meets the floor with its sphere and the rest of the hand as a capsule."""
+    links = (*OTHER_LINKS, PALM, PAYLOAD)
+    assert all(collide(name, FLOOR) for name in (*links, *TIP_SPHERES))
+    assert not any(collide(name, FLOOR) for name in TIP_LINKS)
+    capsules = (*TIP_LINKS, *links)
+    assert all(collide(a, b) for a in capsules for b in capsules)
+    assert not any(
+        collide(a, b) for a in TIP_SPHERES for b in (*capsules, *TIP_SPHERES)
+    )
 
 
 def test_nothing_touches_itself_in_the_stance():
