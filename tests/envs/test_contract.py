@@ -143,13 +143,16 @@ def test_an_end_resets_its_world_only(task, differing):
     assert ".data.qpos" in differing(ended, going, 2)
 
 
-@pytest.mark.parametrize("value", [np.nan, np.inf, 1e20])
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e20])
+@pytest.mark.parametrize(("name", "entry"), [("qpos", 9), ("qvel", 7)])
 def test_a_state_that_is_not_finite_ends_its_episode_and_is_counted(
-    task, value, differing
+    task, name, entry, value, differing
 ):
+    """T8: one world of many, set aside in the same step; the others are the same."""
     action = task.actions(1)[0]
     data = task.first.data
-    bad = task.first.replace(data=data.replace(qvel=data.qvel.at[1, 7].set(value)))
+    spoiled = {name: getattr(data, name).at[1, entry].set(value)}
+    bad = task.first.replace(data=data.replace(**spoiled))
     state, good = task.step(bad, action), task.step(task.first, action)
 
     hit = np.arange(task.batch.num_envs) == 1
@@ -158,17 +161,17 @@ def test_a_state_that_is_not_finite_ends_its_episode_and_is_counted(
     np.testing.assert_array_equal(state.info["truncation"], 0)
     assert differing(state, good, ~hit) == []
     # It pays nothing, is replaced by a sound start, and leaves nothing behind.
-    for name, term in {**state.metrics, "reward": state.reward}.items():
-        assert np.isfinite(term).all(), name
-        assert not name.startswith("reward") or term[1] == 0, name
+    for term, x in {**state.metrics, "reward": state.reward}.items():
+        assert np.isfinite(x).all(), term
+        assert not term.startswith("reward") or x[1] == 0, term
     carried = (state.data, state.obs, state.memory)
     # Schedules may hold infinite steps; everything else is finite.
     weights = "lasting.weights"
     leaves = jax.tree_util.tree_leaves_with_path(carried)
     for path, x in leaves:
-        name = jax.tree_util.keystr(path)
-        if jnp.issubdtype(x.dtype, np.floating) and weights not in name:
-            assert np.isfinite(x).all(), name
+        leaf = jax.tree_util.keystr(path)
+        if jnp.issubdtype(x.dtype, np.floating) and weights not in leaf:
+            assert np.isfinite(x).all(), leaf
     after = task.roll(state, task.actions(3))[-1]
     assert not np.asarray(after.info["invalid"]).any()
 

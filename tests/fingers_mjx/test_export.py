@@ -112,6 +112,20 @@ def test_parity_on_4096_observations(trained, tmp_path):
     assert len(bundle.manifest.parity.obs) == 8
 
 
+def test_parity_on_ten_thousand_observations(trained, tmp_path):
+    """T15: independent draws, extremes among them, through the files."""
+    weights, apply = trained
+    _export(tmp_path, weights, apply)
+    obs = np.concatenate([sample_observations(weights, seed) for seed in range(3)])
+    assert len(obs) >= 10_000
+    policy = load_policy(load_bundle(tmp_path), "onnxruntime")
+    found = np.stack(list(map(policy, obs)))
+    wanted = np.asarray(apply(obs))
+    size = np.maximum(1, np.abs(wanted).max(axis=1, keepdims=True))
+    assert (np.abs(found - np.clip(wanted, -3, 3)) <= 1e-5 * size).all()
+    assert np.isfinite(found).all() and size.max() > 3
+
+
 def test_observations_reach_beyond_training(trained):
     weights, _ = trained
     obs = sample_observations(weights, 0)
