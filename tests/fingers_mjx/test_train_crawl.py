@@ -1,0 +1,141 @@
+"""The whole of the crawl environment is in the checkpoint: T3, T4 and T12 with a hand.
+
+A tiny learner on a few worlds with short episodes, so that footprints, gait phases,
+histories, delays, randomization and curricula are all in the state that is compared.
+"""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from train_setup import assert_same_end, leaves
+
+from envs.batch import BatchEnv
+from envs.errors import InputError
+from envs.physics import default_backend
+from fingers_mjx.ppo_config import PpoConfig, TrainConfig
+from fingers_mjx.run_setup import identity, make_env, new_setup
+from fingers_mjx.train import train
+
+ITERATIONS = 4
+TRAIN = TrainConfig(
+    preset="cpu",
+    num_envs=4,
+    iterations=ITERATIONS,
+    log_every=2,
+    checkpoint_every=2,
+    ppo=PpoConfig(
+        unroll_length=6,
+        epochs=2,
+        minibatches=2,
+        actor_layers=(16,),
+        critic_layers=(16,),
+    ),
+)
+CARRIED = (
+    "worlds/memory/lasting/footprint/",
+    "worlds/memory/lasting/variation/",
+    "worlds/memory/lasting/total_steps",
+    "worlds/memory/lasting/key",
+    "worlds/memory/lift/",
+    "worlds/memory/history/",
+    "worlds/memory/drive/",
+    "worlds/memory/command",
+    "worlds/memory/target",
+    "worlds/memory/action",
+    "worlds/data/qpos",
+    "worlds/data/qacc_warmstart",
+    "train/optimizer/1/hyperparams/learning_rate",
+    "train/normalizer/count/lo",
+    "train/iteration",
+    "key",
+)
+"""What a resumed run needs besides the networks; see the environment's memory."""
+
+
+def setup(**changes):
+    """Settings of a run with episodes of ten control steps."""
+    made = new_setup(TRAIN, None)
+    env = dataclasses.replace(made.env, episode_s=0.2, **changes)
+    return dataclasses.replace(made, env=env)
+
+
+def run(path, env: BatchEnv, settings, iterations=ITERATIONS, **how):
+    config = dataclasses.replace(settings.train, iterations=iterations)
+    return train(
+        lambda worlds: env,
+        config,
+        path,
+        env_config=settings.env,
+        hand=settings.hand,
+        identity=identity(env),
+        **how,
+    )
+
+
+@pytest.fixture(scope="module")
+def env():
+    made = setup()
+    return make_env(made, TRAIN.num_envs, "cpu")
+
+
+@pytest.fixture(scope="module")
+def straight(env, tmp_path_factory):
+    path = tmp_path_factory.mktemp("crawl") / "straight"
+    run(path, env, setup())
+    return path
+
+
+def test_resumed_crawl_is_bit_equal_to_a_straight_one(env, straight, tmp_path):
+    """It is also T12: both start from the same seed, in compilations of their own."""
+    run(tmp_path / "run", env, setup(), iterations=2)
+    halfway = leaves(tmp_path / "run")[1]
+    run(tmp_path / "run", env, setup(), resume=True)
+    assert_same_end(straight, tmp_path / "run")
+    iteration, arrays = leaves(tmp_path / "run")
+    assert iteration == ITERATIONS
+    for part in CARRIED:
+        assert any(name.startswith(part) for name in arrays), part
+    moved = [k for k in arrays if arrays[k].tobytes() != halfway[k].tobytes()]
+    assert "worlds/data/qpos" in moved and "worlds/memory/lift/phase" in moved
+    steps = arrays["worlds/memory/lasting/total_steps"]
+    assert (steps == ITERATIONS * TRAIN.ppo.unroll_length).all()
+    footprints = [k for k in arrays if k.startswith(CARRIED[0])]
+    assert not set(footprints) & set(moved)  # captured once, kept over resets
+
+
+@pytest.mark.parametrize(
+    ("changes", "field"),
+    [
+        ({"action_scale_rad": 0.05}, "env.action_scale_rad"),
+        ({"curriculum_scale": 0.5}, "env.curriculum_scale"),
+        ({"max_roll_deg": 20.0}, "env.max_roll_deg"),
+    ],
+)
+def test_resume_with_another_task_is_refused(env, straight, changes, field):
+    with pytest.raises(InputError) as error:
+        run(straight, env, setup(**changes), resume=True)
+    assert error.value.field == field
+
+
+@pytest.mark.gpu
+def test_resumed_crawl_on_warp_goes_on_where_it_stopped(tmp_path):
+    """Warp is not deterministic: counters, curricula and rate are as saved."""
+    assert default_backend() == "warp"
+    made = setup()
+    made = dataclasses.replace(
+        made, train=dataclasses.replace(made.train, backend="warp")
+    )
+    env = make_env(made, TRAIN.num_envs, "warp")
+    run(tmp_path / "run", env, made, iterations=2)
+    saved = leaves(tmp_path / "run")[1]
+    run(tmp_path / "run", env, made, resume=True)
+    arrays = leaves(tmp_path / "run")[1]
+    step = 2 * TRAIN.ppo.unroll_length
+    name = "worlds/memory/lasting/total_steps"
+    np.testing.assert_array_equal(arrays[name], saved[name] + step)
+    count = "train/normalizer/count/lo"
+    assert arrays[count] == saved[count] + step * TRAIN.num_envs
+    kept = [k for k in arrays if k.startswith("worlds/memory/lasting/variation/")]
+    for k in kept:
+        np.testing.assert_array_equal(arrays[k], saved[k])
