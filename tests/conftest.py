@@ -1,0 +1,60 @@
+"""Watches what the tests make the interpreter do (X1, X3)."""
+
+import sys
+
+import pytest
+
+NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
+UNSAFE = ("pickle.find_class", "os.system")
+LOOPBACK = ("127.0.0.1", "::1", "localhost", "")
+
+
+class Watch:
+    """Events of the interpreter that nothing of ours may cause.
+
+    Attributes:
+        network: attempts to reach another machine, of this process.
+        unsafe: ways of loading that can run code, while `loading` is set.
+    """
+
+    def __init__(self):
+        self.network, self.unsafe, self.loading = [], [], False
+
+    def hook(self, event, args):
+        if event in NETWORK and leaves_the_machine(event, args):
+            self.network.append((event, str(args[-1])))
+        elif self.loading and (event in UNSAFE or is_shell(event, args)):
+            self.unsafe.append((event, str(args)))
+
+
+def leaves_the_machine(event, args):
+    address = args[0] if event == "socket.getaddrinfo" else args[1]
+    host = address[0] if isinstance(address, tuple) else address
+    unix = event != "socket.getaddrinfo" and not isinstance(address, tuple)
+    return not unix and host not in LOOPBACK
+
+
+def is_shell(event, args):
+    words = args[1] if event == "subprocess.Popen" else []
+    return [str(word) for word in words[:2]] in (["/bin/sh", "-c"], ["sh", "-c"])
+
+
+WATCH = Watch()
+sys.addaudithook(WATCH.hook)
+
+
+@pytest.fixture(autouse=True)
+def no_network():
+    """Fails the test in which something tried to reach another machine."""
+    WATCH.network.clear()
+    yield
+    assert WATCH.network == []
+
+
+@pytest.fixture
+def watch():
+    """The watch, with an eye on unsafe loading for the length of a test."""
+    WATCH.unsafe.clear()
+    WATCH.loading = True
+    yield WATCH
+    WATCH.loading = False
