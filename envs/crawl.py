@@ -51,6 +51,9 @@ class CrawlConfig:
         weights: reward weights that replace the start value of the table's.
         command: ranges of the commands.
         randomize: domain randomization.
+        contacts_per_world, constraints_per_world: room for contacts and constraint
+            rows on the warp backend, see `envs.physics.make_physics`; what does not fit
+            is dropped and shows in the metric `contact_overflow`.
     """
 
     episode_s: float = field(default=20.0, metadata={"unit": "s", "low": 0.1})
@@ -65,6 +68,8 @@ class CrawlConfig:
     weights: dict[str, float] = field(default_factory=dict)
     command: CommandConfig = field(default_factory=CommandConfig)
     randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
+    contacts_per_world: int = field(default=48, metadata={"low": 1})
+    constraints_per_world: int = field(default=128, metadata={"low": 1})
 
     def __post_init__(self) -> None:
         check_interval(self.control_dt_s)

@@ -17,7 +17,7 @@ from envs.hand.stance import Stance, stance_of
 from envs.hand_task import HandTask
 from envs.memory import Lasting, Memory
 from envs.observations import Sample, flatten, push, start_history
-from envs.physics import Physics, PhysicsOutput, PhysicsState
+from envs.physics import Physics, PhysicsOutput, PhysicsState, make_physics
 from envs.plant import make_plant
 from envs.randomize import draw_variation
 from envs.scoring import scheduled_weights, score
@@ -50,9 +50,15 @@ class HandEnv:
         self.hand = hand or load_hand_file()
         self.stance = stance or stance_of(self.hand)
         model = build_model(self.hand, np.array(self.stance.q_off))
-        self.plant = make_plant(
-            model, self.hand, self.stance, self.dt, backend, num_worlds
+        physics = make_physics(
+            backend,
+            model,
+            round(self.dt / PHYSICS_DT_S),
+            num_worlds,
+            contacts_per_world=self.config.contacts_per_world,
+            constraints_per_world=self.config.constraints_per_world,
         )
+        self.plant = make_plant(physics, self.hand, self.stance)
         self._q_off = jnp.array(self.stance.q_off)
         first = jax.eval_shape(self.reset, jax.random.key(0))
         self._observation_size = {k: x.shape[-1] for k, x in first.obs.items()}

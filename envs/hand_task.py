@@ -51,6 +51,16 @@ class HandConfig(Protocol):
         """Domain randomization."""
         ...
 
+    @property
+    def contacts_per_world(self) -> int:
+        """Room for contacts on the warp backend, as a mean over the worlds."""
+        ...
+
+    @property
+    def constraints_per_world(self) -> int:
+        """Room for constraint rows on the warp backend, in each world."""
+        ...
+
 
 class HandTask(Protocol):
     """A task for `envs.hand_env.HandEnv`, which does everything else.

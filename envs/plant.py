@@ -15,7 +15,7 @@ from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec, hand_spec
 from envs.hand.stance import Stance
-from envs.physics import Physics, PhysicsOutput, PhysicsState, make_physics
+from envs.physics import Physics, PhysicsOutput, PhysicsState
 from envs.randomize import Variation, model_fields
 
 
@@ -93,39 +93,25 @@ class Plant:
         return jax.tree.map(lambda a, b: jnp.where(finite, a, b), output, rest), ~finite
 
 
-def make_plant(
-    mj_model: mujoco.MjModel,
-    hand: HandFile,
-    stance: Stance,
-    control_dt_s: float,
-    backend: str,
-    num_worlds: int,
-) -> Plant:
+def make_plant(physics: Physics, hand: HandFile, stance: Stance) -> Plant:
     """Makes the plant of a scene.
 
     Args:
-        mj_model: the scene, with the hand built from the same file and stance.
+        physics: backend with the scene, whose hand is built from this file and stance.
         hand: the hand file.
         stance: settled stance of that hand.
-        control_dt_s: control interval [s].
-        backend: physics backend, see `envs.physics`.
-        num_worlds: most worlds that are stepped together.
-
-    Raises:
-        InputError: unknown backend, or one that cannot step this model.
     """
-    substeps = round(control_dt_s / PHYSICS_DT_S)
     kp, kv, limit = (figures().per_joint(k) for k in ("kp", "kv", "force_limit"))
     drive = drive_params(hand, kp, kv, limit)
-    spec = hand_spec(mj_model)
+    spec = hand_spec(physics.mj_model)
     return Plant(
-        mj_model=mj_model,
+        mj_model=physics.mj_model,
         spec=spec,
         joint_range=jnp.asarray(spec.joint_range_rad, jnp.float32),
-        physics=make_physics(backend, mj_model, substeps, num_worlds),
+        physics=physics,
         drive=jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), drive),
         stance=stance,
-        rest=_output_at_rest(mj_model, stance),
+        rest=_output_at_rest(physics.mj_model, stance),
     )
 
 

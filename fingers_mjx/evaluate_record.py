@@ -31,6 +31,7 @@ class Trace:
         power_w: Σ |torque · joint speed| [W].
         done: the episode ended in this step.
         failed: it ended for another reason than the time limit.
+        overflow: the physics ran out of room for contacts and dropped some.
     """
 
     command: Float[Array, "*t 3"]
@@ -46,6 +47,7 @@ class Trace:
     power_w: Float[Array, "*t"]
     done: Bool[Array, "*t"]
     failed: Bool[Array, "*t"]
+    overflow: Bool[Array, "*t"]
 
 
 def record(state: State) -> Trace:
@@ -67,6 +69,7 @@ def record(state: State) -> Trace:
         power_w=power,
         done=done,
         failed=done & (state.info["truncation"] == 0),
+        overflow=state.metrics.get("contact_overflow", jnp.zeros_like(power)) > 0,
     )
 
 
@@ -130,4 +133,5 @@ def _motion_measures(
         ),
         "command_speed_mps": measures.masked_mean(planar, alive),
         "command_turn_rate_rad_s": measures.masked_mean(command[:, 2], alive),
+        "contact_overflow_rate": measures.masked_mean(trace.overflow * 1.0, alive),
     }

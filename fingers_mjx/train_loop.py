@@ -169,7 +169,8 @@ class Loop:
         if share > 0.0:
             sentence = (
                 f"contact or constraint buffers were too small in {share:.2%} of the "
-                "control steps since the last row, and contacts were dropped there"
+                "control steps since the last row, and contacts were dropped there; "
+                "raise env.contacts_per_world or env.constraints_per_world"
             )
             self.desk.on_progress({"event": "note", "text": sentence})
 

@@ -1,0 +1,100 @@
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from envs.crawl import CrawlConfig, CrawlEnv
+from envs.errors import InputError
+from envs.physics import PhysicsOutput
+from envs.plant import check_interval
+
+
+class TooSmall:
+    """The cpu backend, which drops contacts of hands that stand beyond x = 0.5 m."""
+
+    def __init__(self, inner):
+        self.inner = inner
+        self.mj_model, self.n_substeps = inner.mj_model, inner.n_substeps
+
+    def step(self, fields, state, ctrl):
+        output = self.inner.step(fields, state, ctrl)
+        return output.replace(overflow=jnp.where(state.qpos[0] > 0.5, 12, 0))
+
+
+def test_dropped_contacts_are_told_by_the_environment():
+    """T9: Warp's overflow bits become a metric of the step, also of an invalid one."""
+    env = CrawlEnv()
+    env.plant = dataclasses.replace(env.plant, physics=TooSmall(env.plant.physics))
+    state = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 4))
+    np.testing.assert_array_equal(state.metrics["contact_overflow"], 0)
+    qpos = state.data.qpos.at[:, 0].set(jnp.array([0.0, 1.0, 0.0, 1.0]))
+    qvel = state.data.qvel.at[2:].set(jnp.nan)
+    state = state.replace(data=state.data.replace(qpos=qpos, qvel=qvel))
+    after = jax.jit(jax.vmap(env.step))(state, jnp.zeros((4, 20)))
+    np.testing.assert_array_equal(after.metrics["contact_overflow"], [0, 1, 0, 1])
+    np.testing.assert_array_equal(after.info["invalid"], [0, 0, 1, 1])
+
+
+def test_room_for_contacts_is_a_setting(monkeypatch):
+    given = {}
+
+    def spy(backend, model, substeps, worlds, **options):
+        given.update(options, worlds=worlds, substeps=substeps)
+        return make_physics(backend, model, substeps, worlds, **options)
+
+    from envs import hand_env
+
+    make_physics = hand_env.make_physics
+    monkeypatch.setattr(hand_env, "make_physics", spy)
+    CrawlEnv(CrawlConfig(contacts_per_world=7, constraints_per_world=9), num_worlds=5)
+    assert given == {
+        "contacts_per_world": 7,
+        "constraints_per_world": 9,
+        "worlds": 5,
+        "substeps": 4,
+    }
+
+
+@pytest.fixture(scope="module")
+def plant():
+    return CrawlEnv().plant
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+@pytest.mark.parametrize("where", ["qpos", "qvel", "qacc_warmstart", "sensordata"])
+def test_a_result_that_is_not_finite_is_replaced_by_the_stance(plant, where, value):
+    good = plant.rest.replace(overflow=jnp.int32(4))
+    state = good.state
+    if where == "sensordata":
+        bad = good.replace(sensordata=good.sensordata.at[5].set(value))
+    else:
+        spoiled = {where: getattr(state, where).at[3].set(value)}
+        bad = good.replace(state=state.replace(**spoiled))
+    output, invalid = plant.replace_invalid(bad)
+    assert invalid and output.overflow == 4
+    for x, y in zip(
+        jax.tree.leaves(output.replace(overflow=0)),
+        jax.tree.leaves(plant.rest.replace(overflow=0)),
+        strict=True,
+    ):
+        np.testing.assert_array_equal(x, y)
+
+
+def test_a_finite_result_is_left_as_it_is(plant):
+    moved = plant.rest.replace(sensordata=plant.rest.sensordata + 1.0)
+    output, invalid = plant.replace_invalid(moved)
+    assert not invalid and isinstance(output, PhysicsOutput)
+    np.testing.assert_array_equal(output.sensordata, moved.sensordata)
+
+
+@pytest.mark.parametrize("interval", [0.005, 0.02, 0.015, 0.1])
+def test_control_intervals_are_whole_physics_steps(interval):
+    check_interval(interval)
+
+
+@pytest.mark.parametrize("interval", [0.0, 0.013, 0.0025, 0.0201, 0.001])
+def test_other_intervals_are_refused(interval):
+    with pytest.raises(InputError, match="control_dt_s"):
+        check_interval(interval)
