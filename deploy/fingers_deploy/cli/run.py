@@ -76,6 +76,7 @@ def run(options: argparse.Namespace) -> int:
             "loop_hz": options.loop_hz,
             "record": None if options.no_record else options.out,
             "mounting": options.mounting,
+            "realtime": not options.no_realtime,
             "wiggle": WIGGLES[options.wiggle],
             "runtime": options.runtime,
             "joystick": options.joystick,
@@ -126,6 +127,9 @@ def _add_driver(parser: argparse.ArgumentParser) -> None:
 def _add_loop(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("loop")
     group.add_argument("--loop-hz", type=float, default=500.0)
+    group.add_argument(
+        "--no-realtime", action="store_true", help="do not ask for SCHED_FIFO"
+    )
     group.add_argument("--wiggle", choices=tuple(WIGGLES), default="all")
     group.add_argument("--out", default=".", help="folder of the recording")
     group.add_argument("--no-record", action="store_true")

@@ -86,11 +86,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ignore_interrupts()
     link = socket.socket(fileno=int(handle))
     try:
-        policies = make_policies(json.loads(text))
+        options = json.loads(text)
+        policies = make_policies(options)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
-    prefer_this_process(PRIORITY - 10)
+    prefer_this_process(PRIORITY - 10, ask=bool(options["realtime"]))
     serve(link, policies)
     return 0
 

@@ -6,7 +6,7 @@ import os
 PRIORITY = 50
 
 
-def prefer_this_process(priority: int = PRIORITY) -> str:
+def prefer_this_process(priority: int = PRIORITY, ask: bool = True) -> str:
     """Asks for SCHED_FIFO and takes garbage collection out of the loop.
 
     To be called once everything that lives on has been made: what exists is frozen, and
@@ -15,6 +15,7 @@ def prefer_this_process(priority: int = PRIORITY) -> str:
 
     Args:
         priority: real-time priority, 1 to 99.
+        ask: ask for it at all.
 
     Returns:
         What was obtained, in words, for status and log.
@@ -22,6 +23,8 @@ def prefer_this_process(priority: int = PRIORITY) -> str:
     gc.collect()
     gc.freeze()
     gc.disable()
+    if not ask:
+        return "no real-time priority (not asked for)"
     try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
     except (OSError, AttributeError) as error:

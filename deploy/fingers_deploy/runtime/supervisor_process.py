@@ -56,7 +56,8 @@ class Supervisor:
     """One run: the loop around `Core`.
 
     Args:
-        options: `driver`, `bundles`, `loop_hz`, `record` (folder or None), `wiggle`.
+        options: `driver`, `bundles`, `loop_hz`, `record` (folder or None), `wiggle`,
+            `realtime` (whether to ask for it).
         policy: link to the policy.
         console: link to the console.
 
@@ -71,6 +72,7 @@ class Supervisor:
         check_together(bundles)
         interface = bundles[0].manifest.interface
         self._console = ConsoleLink(console)
+        self._realtime = bool(options["realtime"])
         self._driver = open_driver(options["driver"], interface)
         try:
             dry = bool(options["driver"].get("dry_run")) or not self._driver.info.live
@@ -99,7 +101,7 @@ class Supervisor:
         Returns:
             0 after a stop by the operator, 5 after a fault.
         """
-        realtime = prefer_this_process()
+        realtime = prefer_this_process(ask=self._realtime)
         tripped: set[str] = set()
         try:
             ticker = Ticker(self._period_s)

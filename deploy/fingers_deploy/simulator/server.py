@@ -14,6 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fingers_deploy.errors import InputError
+from fingers_deploy.runtime.realtime import PRIORITY, prefer_this_process
 from fingers_deploy.simulator.hand import SimulatedHand
 from fingers_deploy.simulator.packets import REQUEST, Ask
 
@@ -152,6 +153,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if options.lockstep:
             server.run_lockstep()
         else:
+            # A real hand does not wait for this computer either.
+            prefer_this_process(PRIORITY + 10)
             server.run_realtime(options.lifetime_s)
     return 0
 

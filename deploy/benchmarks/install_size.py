@@ -1,0 +1,75 @@
+"""What the shim takes on a disk, and how long it takes to import.
+
+    python deploy/benchmarks/install_size.py
+
+builds the wheel and installs it into fresh environments, without and with ONNX Runtime.
+"""
+
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+DEPLOY = Path(__file__).parents[1]
+_IMPORT = """
+import time
+start = time.perf_counter()
+import fingers_deploy
+print(time.perf_counter() - start)
+"""
+
+
+def _run(*program: str | Path) -> str:
+    done = subprocess.run(
+        [str(word) for word in program], check=True, capture_output=True, text=True
+    )
+    return done.stdout
+
+
+def size_mb(folder: Path) -> float:
+    """Size of the files of a folder, 10⁶ bytes."""
+    files = (file for file in folder.rglob("*") if file.is_file())
+    return round(sum(file.stat().st_size for file in files) / 1e6, 1)
+
+
+def measure(wheel: Path, extra: str, folder: Path) -> dict:
+    """Installs the wheel with an extra; returns sizes and time of import."""
+    _run("uv", "venv", "-q", "--python", sys.executable, folder)
+    python = folder / "bin" / "python"
+    _run("uv", "pip", "install", "-q", "--python", python, f"{wheel}{extra}")
+    site = next((folder / "lib").glob("python*")) / "site-packages"
+    sizes = {entry.name: size_mb(entry) for entry in site.iterdir() if entry.is_dir()}
+    _run(python, "-c", _IMPORT)
+    times = sorted(float(_run(python, "-c", _IMPORT)) for _ in range(5))
+    # What no policy needs: tests, and libraries to link other programs with.
+    spare = [f for d in site.rglob("tests") if d.is_dir() for f in d.rglob("*")]
+    spare += [*site.rglob("*.a"), *site.rglob("*.pyi")]
+    return {
+        "extra": extra or "none",
+        "of_that_tests_and_stubs_mb": round(
+            sum(f.stat().st_size for f in set(spare) if f.is_file()) / 1e6, 1
+        ),
+        "installed_mb": size_mb(site),
+        "largest_mb": dict(sorted(sizes.items(), key=lambda x: -x[1])[:6]),
+        "fingers_deploy_mb": sizes["fingers_deploy"],
+        "import_s": times[2],
+    }
+
+
+def main() -> int:
+    """Runs the measurement and prints it as JSON."""
+    with tempfile.TemporaryDirectory() as folder:
+        base = Path(folder)
+        _run("uv", "build", "-q", "--wheel", DEPLOY, "-o", base / "dist")
+        wheel = next((base / "dist").glob("*.whl"))
+        results = [
+            measure(wheel, extra, base / f"venv{i}")
+            for i, extra in enumerate(("", "[onnx]"))
+        ]
+    print(json.dumps(results, indent=1))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
