@@ -1,0 +1,77 @@
+"""What the documents say can be typed, clicked and run."""
+
+import doctest
+import re
+import shlex
+from pathlib import Path
+
+import pytest
+
+from fingers_mjx.cli_parser import UsageError, make_parser
+
+ROOT = Path(__file__).parents[1]
+DOCUMENTS = sorted(
+    [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), ROOT / "deploy/README.md"]
+)
+PLACES = re.compile(r"/(work|tmp|home|root)/|localhost", re.IGNORECASE)
+
+
+def commands(text):
+    """Yields the lines of shell blocks, without comments."""
+    for block in re.findall(r"```sh\n(.*?)```", text, re.DOTALL):
+        for line in block.splitlines():
+            if words := shlex.split(line, comments=True):
+                yield words
+
+
+def name(path):
+    return str(path.relative_to(ROOT))
+
+
+def test_examples_of_the_readme_give_what_they_say():
+    result = doctest.testfile(str(ROOT / "README.md"), module_relative=False)
+    assert result.attempted >= 4
+    assert result.failed == 0
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=name)
+def test_links_lead_somewhere(path):
+    targets = re.findall(r"\]\(([^)#]+)[^)]*\)", path.read_text("utf-8"))
+    local = [t for t in targets if "://" not in t]
+    assert [t for t in local if not (path.parent / t).exists()] == []
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=name)
+def test_commands_exist(path):
+    parser, makefile = make_parser(), (ROOT / "Makefile").read_text("utf-8")
+    for words in commands(path.read_text("utf-8")):
+        if words[0] == "fingers":
+            parser.parse_args(words[1:])
+        elif words[0] == "make":
+            assert re.search(rf"^{words[1]}:", makefile, re.MULTILINE), words
+        elif words[0] == "python":
+            assert (ROOT / words[1]).exists(), words
+
+
+def test_wrong_commands_would_be_seen():
+    """Negative control."""
+    assert list(commands("```sh\nfingers train --no-such x  # why\n```")) == [
+        ["fingers", "train", "--no-such", "x"]
+    ]
+    with pytest.raises(UsageError):
+        make_parser().parse_args(["train", "--no-such", "x"])
+
+
+@pytest.mark.parametrize("path", DOCUMENTS, ids=name)
+def test_documents_name_no_place_of_one_machine(path):
+    assert PLACES.search(path.read_text("utf-8")) is None
+
+
+def test_settings_in_the_training_guide_exist():
+    from fingers_mjx.ppo_config import TrainConfig
+    from fingers_mjx.run_setup import new_setup, overridden
+
+    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    (given,) = re.findall(r"`--set ([^`]+)`", text)
+    made = overridden(new_setup(TrainConfig(), None), given.split())
+    assert (made.train.num_envs, made.env.curriculum_scale) == (2048, 0.25)
