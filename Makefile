@@ -3,7 +3,7 @@
 
 UV := $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := $(UV) run --no-sync
-QUICK := tests/test_layers.py tests/rewards deploy/tests
+QUICK := tests/test_layers.py tests/test_documentation.py tests/rewards
 
 .DEFAULT_GOAL := help
 .PHONY: help sync format check test test-slow test-gpu demo bench build clean
