@@ -118,8 +118,8 @@ def _learning(learned: Learned) -> report.Section:
     )
     standing = figures.standing(
         {
-            "before": np.asarray(learned.before.traces.done),
-            "after": np.asarray(learned.after.traces.done),
+            "before": np.asarray(learned.before.traces.failed),
+            "after": np.asarray(learned.after.traces.failed),
         },
         learned.after.dt_s,
     )
@@ -134,7 +134,7 @@ def _learning(learned: Learned) -> report.Section:
     blocks = [
         report.Note(text),
         report.picture(curves, "Learning curves"),
-        report.picture(standing, "Hands that have not fallen, randomized worlds"),
+        report.picture(standing, "Randomized worlds under the policy of each time"),
         table,
     ]
     return report.Section("Learning on this machine", blocks)

@@ -173,23 +173,23 @@ def training_curves(
 
 
 def standing(
-    done: Mapping[str, Bool[np.ndarray, "T episodes"]],
+    failed: Mapping[str, Bool[np.ndarray, "T episodes"]],
     dt_s: float,
-    title: str = "Episodes that have not ended",
+    title: str = "Episodes without a fall",
 ) -> Figure:
-    """Draws the fraction of episodes that still run, over time, one line per policy.
+    """Draws the fraction of episodes without a fall yet, over time, for each policy.
 
     Args:
-        done: name of a policy to whether each episode ended in each step.
+        failed: name of a policy to whether each episode failed in each step.
         dt_s: control interval.
         title: of the figure.
     """
     figure, (axes,) = _figure(1, (7.6, 2.8))
-    for (name, ended), colour in zip(done.items(), _cycle(len(done)), strict=True):
-        running = 1.0 - np.maximum.accumulate(ended, axis=0).mean(axis=1)
-        time = dt_s * (1 + np.arange(len(running)))
-        axes.plot(time, 100 * running, color=colour, lw=1.8, label=name)
-    axes.set(xlabel="time [s]", ylabel="running [%]", ylim=(-3, 103), title=title)
+    for (name, fell), colour in zip(failed.items(), _cycle(len(failed)), strict=True):
+        left = 1.0 - np.maximum.accumulate(fell, axis=0).mean(axis=1)
+        time = dt_s * (1 + np.arange(len(left)))
+        axes.plot(time, 100 * left, color=colour, lw=1.8, label=name)
+    axes.set(xlabel="time [s]", ylabel="standing [%]", ylim=(-3, 103), title=title)
     axes.legend()
     return figure
 

@@ -8,6 +8,7 @@ from fingers_mjx.figures import (
     FINGER_COLOURS,
     foot_trajectories,
     gait_diagram,
+    standing,
     tracking,
     tracking_in_time,
     training_curves,
@@ -35,6 +36,7 @@ def all_figures():
         "feet": foot_trajectories(PATHS, CONTACT),
         "tracking": tracking(COLUMNS),
         "time": tracking_in_time(PATHS[:, 0], PATHS[:, 1, :2], PATHS[:, 2, 0], DT),
+        "standing": standing({"a": CONTACT}, DT),
         "training": training_curves({"a": ROWS}, {"return": "return [1]"}),
     }
 
@@ -90,3 +92,11 @@ def test_curves_skip_rows_without_the_metric_and_keep_runs_apart():
 def test_figures_of_nothing_are_empty_not_broken():
     gait_diagram(CONTACT[:0], DT).savefig(io.BytesIO())
     tracking({name: np.full(3, np.nan) for name in COLUMNS}).savefig(io.BytesIO())
+
+
+def test_a_hand_that_has_fallen_does_not_stand_up_again():
+    failed = np.zeros((10, 4), bool)
+    failed[3, 0] = failed[6:, 1] = True
+    line = standing({"policy": failed}, DT).axes[0].lines[0]
+    np.testing.assert_allclose(line.get_ydata(), [100] * 3 + [75] * 3 + [50] * 4)
+    np.testing.assert_allclose(line.get_xdata(), DT * np.arange(1, 11))

@@ -1,0 +1,101 @@
+"""The demonstration, as small as it can be: every part of it in one report."""
+
+import re
+from dataclasses import replace
+
+import pytest
+from cli_setup import TRAIN, make_bundle, make_setup
+
+from fingers_mjx.cli import main
+from fingers_mjx.cli_progress import counting
+from fingers_mjx.demo import DemoSize
+from fingers_mjx.demo_learn import LearnSize
+from fingers_mjx.demo_show import ShowSize
+from fingers_mjx.policy_source import load_source
+
+SIZE = DemoSize(
+    ShowSize(episodes=2, steps=60, film_s=0.4, fps=10, width=96),
+    LearnSize(replace(TRAIN, iterations=2), episodes=4, steps=20),
+)
+
+
+@pytest.fixture(scope="module")
+def shown(tmp_path_factory):
+    path = tmp_path_factory.mktemp("demo")
+    bundle = make_bundle(path / "policy", make_setup())
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("fingers_mjx.demo.DemoSize", lambda: SIZE)
+        argv = ["demo", "--out", str(path / "out"), "--policy", str(bundle)]
+        assert main(argv) == 0
+    return path / "out"
+
+
+def test_everything_is_there(shown):
+    names = {p.name for p in shown.iterdir()}
+    runs = [n for n in names if n.startswith("run-")]
+    assert names == {"evaluation", "walk.mp4", "report.html", *runs}
+    assert len(runs) == 1
+    run = shown / runs[0]
+    assert load_source(run).steps_trained == 2 * 16
+    assert (run / "policy.onnx").exists()
+
+
+def test_one_report_holds_it_all(shown):
+    page = (shown / "report.html").read_text(encoding="utf-8")
+    titles = re.findall(r"<h2>(.*?)</h2>", page)
+    assert titles == [
+        "The walk",
+        "In randomized worlds",
+        "Through the deployment shim",
+        "Learning on this machine",
+        "Export of the new policy",
+        "Provenance",
+    ]
+    assert page.count("data:video/mp4") == 1
+    assert page.count("data:image/png") == 6
+    assert "fingers demo --out" in page
+    # Nothing is loaded from elsewhere.
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', page)
+
+
+def test_without_a_policy_nothing_is_begun(tmp_path, capsys):
+    out = tmp_path / "out"
+    argv = ["demo", "--out", str(out), "--policy", str(tmp_path / "none")]
+    assert main(argv) == 2
+    assert "none" in capsys.readouterr().err
+    assert not out.exists()
+
+
+class Terminal:
+    """A stream that says that it is one."""
+
+    def __init__(self, live):
+        self.live, self.text = live, ""
+
+    def isatty(self):
+        return self.live
+
+    def write(self, text):
+        self.text += text
+
+    def flush(self):
+        pass
+
+
+def test_counting_is_one_live_line_on_a_terminal():
+    stream = Terminal(live=True)
+    with counting(stream, "drawing", "frames") as count:
+        count(1, 2)
+        count(2, 2)
+    assert stream.text.count("\n") == 1
+    assert stream.text.rstrip().endswith("drawing: 2 of 2 frames")
+
+
+def test_counting_keeps_few_lines_where_they_are_kept():
+    stream = Terminal(live=False)
+    with counting(stream, "drawing", "frames") as count:
+        for index in range(100):
+            count(index + 1, 100)
+    lines = stream.text.splitlines()
+    assert len(lines) <= 3
+    assert '"done": 100' in lines[-1]
