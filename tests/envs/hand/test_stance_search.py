@@ -3,6 +3,7 @@ import dataclasses
 import mujoco
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
@@ -29,9 +30,12 @@ def stored_start(problem):
     """Near the pose from which the stored stance was settled: 2°, 3 mm, 1° away."""
     print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
+    root = Rotation.from_quat(STANCE.root_quat_w, scalar_first=True)
+    level = Rotation.from_quat(palm_quat(0.0, 0.0), scalar_first=True)
+    _, roll, pitch = (root * level.inv()).as_euler("ZXY")
     target = np.clip(STANCE.target_rad, problem.low + 0.1, problem.high - 0.1)
     joints = target + rng.uniform(-0.02, 0.02, 20)
-    return np.r_[0.742 + 0.03, -0.151, 0.128 + 0.003, joints]
+    return np.r_[pitch + 0.03, roll, STANCE.root_pos_w[2] + 0.003, joints]
 
 
 @pytest.fixture(scope="module")
