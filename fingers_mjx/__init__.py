@@ -1,1 +1,1 @@
-"""TODO."""
+"""Training, evaluation, export and the command line for hands that walk."""
