@@ -20,7 +20,13 @@ from fingers_mjx.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
 from fingers_mjx.ppo_policy import read, warm_started
 from fingers_mjx.ppo_state import make_learner, train_template
-from fingers_mjx.run_setup import Setup, config_digest, make_env, run_setup
+from fingers_mjx.run_setup import (
+    Setup,
+    check_run_interface,
+    config_digest,
+    make_env,
+    run_setup,
+)
 from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
 
 
@@ -40,6 +46,7 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
     """
     setup, saved = run_setup(run_dir), read(run_dir)
     env = make_env(setup, 1, "cpu")
+    check_run_interface(run_dir, env)
     weights, apply = _network(setup, run_dir, env)
     report = export_policy(
         out_dir,

@@ -65,11 +65,24 @@ def check_interface(source: object, found: Interface, ours: Interface) -> None:
     Raises:
         InputError: naming the first field that differs.
     """
-    theirs = dict(_leaves(dataclasses.asdict(found), "interface"))
-    for field, wanted in _leaves(dataclasses.asdict(ours), "interface"):
-        value = theirs.get(field, "nothing")
-        if not _same(value, wanted):
-            valid = f"{wanted}, as the environment has"
+    check_same(source, dataclasses.asdict(found), dataclasses.asdict(ours))
+
+
+def check_same(source: object, found: Mapping[str, Any], ours: Any) -> None:
+    """Refuses plain data of an interface that is not that of the environment.
+
+    Args:
+        source: file of the policy, for the message.
+        found: what the policy has; what it does not mention is not compared.
+        ours: what the environment has.
+
+    Raises:
+        InputError: naming the first field that differs.
+    """
+    wanted = dict(_leaves(ours, "interface"))
+    for field, value in _leaves(dict(found), "interface"):
+        if not _same(value, wanted.get(field, "nothing")):
+            valid = f"{wanted.get(field, 'nothing')}, as the environment has"
             raise InputError(source, field, value, valid)
 
 

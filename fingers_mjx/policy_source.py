@@ -13,7 +13,14 @@ from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_mjx.policy_interface import check_interface, interface_of
 from fingers_mjx.ppo_policy import Network, load_policy
-from fingers_mjx.run_setup import Setup, config_digest, load_setup, make_env, run_setup
+from fingers_mjx.run_setup import (
+    Setup,
+    check_run_interface,
+    config_digest,
+    load_setup,
+    make_env,
+    run_setup,
+)
 from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE
 
 
@@ -45,8 +52,9 @@ def load_source(path: Path) -> PolicySource:
         BundleError: a bundle that is damaged or made for another hand.
     """
     if is_run(path):
-        policy = load_policy(path)
-        return PolicySource(path, run_setup(path), policy, policy.meta["env_steps"])
+        setup, policy = run_setup(path), load_policy(path)
+        check_run_interface(path, make_env(setup, 1, "cpu"))
+        return PolicySource(path, setup, policy, policy.meta["env_steps"])
     bundle, setup = load_bundle_setup(path)
     steps = bundle.manifest.provenance.normalizer.steps
     return PolicySource(path, setup, bundle.network, steps)

@@ -15,16 +15,16 @@ import numpy as np
 from envs.batch import BatchEnv
 from envs.config import load_yaml, override
 from envs.errors import InputError
-from envs.hand.figures import figures
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.model import build_spec
-from envs.observations import TERMS
 from envs.registry import get_task, make_batch
+from fingers_mjx.policy_interface import check_same, interface_of
 from fingers_mjx.ppo_config import TrainConfig
 from fingers_mjx.ppo_config_check import check_config
-from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, saved_task
+from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
 
 ENV_PREFIX = "env."
+INTERFACE = "interface"
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,9 @@ def run_setup(run_dir: Path) -> Setup:
     Raises:
         InputError: no run directory, one of another version, or an unknown task.
     """
-    task = saved_task(run_dir)
+    task = saved_bound(run_dir).get("train", {}).get("task")
+    if not isinstance(task, str):
+        raise InputError(run_dir / RUN_FILE, "bound.train.task", task, "a task")
     return load_setup(run_dir / CONFIG_FILE, run_dir / HAND_FILE, task)
 
 
@@ -111,16 +113,26 @@ def identity(env: BatchEnv) -> dict[str, Any]:
     """Returns what a resumed run must share besides its settings.
 
     The hash of the model is that of its MJCF, which holds all of hand and stance that
-    physics sees; the drive's delay and filter are in the hand's own.
+    physics sees; the drive's delay and filter are in the hand's own. The interface is
+    also what an evaluation or export of the run must share.
     """
     spec = build_spec(env.hand, np.array(env.stance.q_off))
     spec.compile()
     return {
         "hand_sha256": env.hand.sha256,
         "model_sha256": hashlib.sha256(spec.to_xml().encode()).hexdigest(),
-        "joint_names": list(figures().joint_names),
-        "observation_terms": list(TERMS),
+        INTERFACE: dataclasses.asdict(interface_of(env)),
     }
+
+
+def check_run_interface(run_dir: Path, env: BatchEnv) -> None:
+    """Refuses a run whose policy reads or moves something else than `env` has.
+
+    Raises:
+        InputError: naming the first field that differs.
+    """
+    saved = saved_bound(run_dir).get("identity", {}).get(INTERFACE, {})
+    check_same(run_dir / RUN_FILE, saved, dataclasses.asdict(interface_of(env)))
 
 
 def config_digest(directory: Path) -> str:

@@ -97,18 +97,16 @@ def saved_config(path: Path, cls: type[T]) -> T:
     return load_yaml(cls, path / CONFIG_FILE)
 
 
-def saved_task(path: Path) -> str:
-    """Returns the name of the task that the run at `path` trains.
+def saved_bound(path: Path) -> dict[str, Any]:
+    """Returns what a resumed run must share with the run at `path`, by nested names.
 
     Raises:
         InputError: if `path` is not a run directory that this version can read.
     """
     bound = _read_run(path).get("bound")
-    task = bound.get("train", {}).get("task") if isinstance(bound, dict) else None
-    if not isinstance(task, str):
-        valid = "the name of a task"
-        raise InputError(path / RUN_FILE, "bound.train.task", task, valid)
-    return task
+    if not isinstance(bound, dict):
+        raise InputError(path / RUN_FILE, "bound", bound, "a mapping")
+    return bound
 
 
 def check_bound(path: Path, current: Mapping[str, Any]) -> None:
@@ -121,7 +119,7 @@ def check_bound(path: Path, current: Mapping[str, Any]) -> None:
     Raises:
         InputError: naming the first field that differs, its saved and current value.
     """
-    saved, now = _flat(_read_run(path)["bound"]), _flat(json.loads(_json(current)))
+    saved, now = _flat(saved_bound(path)), _flat(json.loads(_json(current)))
     for name in sorted(saved.keys() | now.keys()):
         was, found = saved.get(name, "nothing"), now.get(name, "nothing")
         if was != found:

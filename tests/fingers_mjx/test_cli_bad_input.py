@@ -209,6 +209,12 @@ SPOILT = [
         ["export", "run"],
         ["juggle", "crawl"],
     ),
+    (
+        "run/run.json",
+        replace('"control_rate_hz": 50.0', '"control_rate_hz": 100.0'),
+        ["eval", "run"],
+        ["run.json", "interface.control_rate_hz", "100.0", "50.0"],
+    ),
     ("run/run.json", cut, ["export", "run"], ["run", "fingers train"]),
     (
         "run/config.yaml",
