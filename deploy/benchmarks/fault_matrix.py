@@ -17,7 +17,7 @@ from fault_lab import Lab, snapshots
 from fault_links import LOSSES, burst, measure_loss
 from fault_processes import SIGNALS, WITHIN_S, kill_one
 from fault_scenarios import SCENARIOS, Scenario
-from fault_startup import STARTS, start_up
+from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
 from hand_files import marching_bundle, write_model
 
@@ -26,7 +26,6 @@ from fingers_deploy.safety import ROWS, Mode
 from fingers_mjx.bundle import write_bundle
 
 PHASES, SPACING_S = 20, 0.13
-_START_STEP_RAD = 0.02
 
 
 def measure_scenario(starts: list[Lab], scenario: Scenario, trials: int, seed: int):
@@ -55,13 +54,8 @@ def measure_scenario(starts: list[Lab], scenario: Scenario, trials: int, seed: i
 
 def measure_start(model: Path, bundle: Bundle, name: str, trials: int, hz: float):
     """Runs one faulty start many times; returns its row of the results."""
-    row, _, runs = STARTS[name]
     done = [start_up(model, bundle, name, k, hz) for k in range(trials)]
-    good = [
-        s.active == runs and (not row or row in s.rows.split())
-        and s.step_rad <= _START_STEP_RAD
-        for s in done
-    ]  # fmt: skip
+    good = [stopped_rightly(start, name) for start in done]
     return {
         "start": name,
         "trials": trials,

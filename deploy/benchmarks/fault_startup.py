@@ -11,6 +11,7 @@ from fingers_deploy.bundle import Bundle
 from fingers_deploy.reading import Reading
 from fingers_deploy.safety import Mode, Operator
 
+LARGEST_STEP_RAD = 0.02
 ABDUCTION = (1, 5, 9, 13, 17)
 
 
@@ -54,10 +55,11 @@ def _no_power(lab: Lab, rng: np.random.Generator) -> None:
 
 
 def _far_pose(lab: Lab, rng: np.random.Generator) -> None:
-    """The fingers are anywhere within their limits, the hand in the air."""
+    """Every joint is up to 0.3 rad away from its target, the hand in the air."""
     hand = lab.driver.hand
     low, high = hand.joint_limits_rad.T
-    hand.data.qpos[hand._qpos] = rng.uniform(0.8 * low + 0.2 * high, high)
+    away = lab.core.limits.rest_rad + rng.uniform(-0.3, 0.3, 20)
+    hand.data.qpos[hand._qpos] = np.clip(away, low, high)
     hand.data.qpos[2] += 0.3
     hand.model.opt.gravity[:] = 0.0
 
@@ -72,23 +74,25 @@ def _other_order(lab: Lab, rng: np.random.Generator) -> None:
     lab.driver.info = replace(lab.driver.info, joint_names=tuple(names))
 
 
-STARTS: dict[str, tuple[str, Callable, bool]] = {
-    "S17 two joints swapped": ("S17", _swapped, False),
-    "S17 left hand": ("S17", _left_hand, False),
-    "S17 joint names in another order": ("preflight", _other_order, False),
-    "S17 low-pass at 10 Hz": ("preflight", _wrong_filter, False),
-    "S20 cache still zero": ("preflight", _zeros, False),
-    "S20 power not confirmed": ("S20", _no_power, False),
-    "S20 pose far from the stance": ("", _far_pose, True),
+# A wrong hand pushes against itself, or falls, before the wiggle test gets to it.
+_WRONG = {"S17", "S5", "S7", "S8", "S8b"}
+STARTS: dict[str, tuple[set[str], Callable, bool]] = {
+    "S17 two joints swapped": (_WRONG, _swapped, False),
+    "S17 left hand": (_WRONG, _left_hand, False),
+    "S17 joint names in another order": ({"preflight"}, _other_order, False),
+    "S17 low-pass at 10 Hz": ({"preflight"}, _wrong_filter, False),
+    "S20 cache still zero": ({"preflight"}, _zeros, False),
+    "S20 power not confirmed": ({"S20"}, _no_power, False),
+    "S20 pose far from the stance": (set(), _far_pose, True),
 }
-"""Name: row that must stop it, the fault, whether the policy runs in the end."""
+"""Name: rows of which one must stop it, the fault, whether the policy runs at last."""
 
 
 def start_up(model: Path, bundle: Bundle, name: str, seed: int, hz: float) -> Start:
     """Arms a hand that has this fault from the beginning."""
-    row, install, _ = STARTS[name]
+    rows, install, _ = STARTS[name]
     rng = np.random.default_rng(seed)
-    wiggle = tuple(range(20)) if row == "S17" else (int(rng.integers(20)),)
+    wiggle = tuple(range(20)) if rows == _WRONG else (int(rng.integers(20)),)
     if name.endswith("stance"):
         wiggle = ()
     lab = Lab(model, (bundle,), loop_hz=hz, wiggle=wiggle, seed=seed)
@@ -101,10 +105,17 @@ def start_up(model: Path, bundle: Bundle, name: str, seed: int, hz: float) -> St
     targets = np.array([pose, *(target for _, target in lab.driver.written)])
     lab.run(1.0)
     step = float(np.abs(np.diff(targets, axis=0)).max()) if len(targets) > 1 else 0.0
-    rows = [fault.id for fault in lab.core.state.faults]
+    latched = [fault.id for fault in lab.core.state.faults]
     if not all(check.passed for check in lab.core.checks):
-        rows.append("preflight")
-    return Start(lab.mode == Mode.ACTIVE, " ".join(rows), step)
+        latched.append("preflight")
+    return Start(lab.mode == Mode.ACTIVE, " ".join(latched), step)
+
+
+def stopped_rightly(start: Start, name: str) -> bool:
+    """Whether a start ended as it must, without a large step."""
+    rows, _, runs = STARTS[name]
+    named = not rows or bool(rows & set(start.rows.split()))
+    return start.active == runs and named and start.step_rad <= LARGEST_STEP_RAD
 
 
 def _pose(lab: Lab, change: Callable) -> None:

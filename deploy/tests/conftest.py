@@ -1,4 +1,6 @@
 import itertools
+import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +16,9 @@ from fingers_deploy.manifest import (
 )
 from fingers_mjx.bundle import encode_bundle, write_bundle
 from fingers_mjx.onnx_graph import PolicyWeights
+
+# The measurements are tested as well: `hand_files`, `fault_lab`, ….
+sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 SEED = 20260
 
@@ -128,3 +133,26 @@ def bundle_dir(bundle, tmp_path):
 @pytest.fixture(scope="session")
 def forward():
     return reference_forward
+
+
+@pytest.fixture(scope="session")
+def hand_model(tmp_path_factory):
+    """The calibrated hand in its stance, as MJCF."""
+    from hand_files import write_model
+
+    return write_model(tmp_path_factory.mktemp("model") / "hand.xml")
+
+
+@pytest.fixture(scope="session")
+def marching():
+    """A policy that marches in place on the calibrated hand."""
+    from hand_files import marching_bundle
+
+    return marching_bundle()
+
+
+@pytest.fixture(scope="session")
+def marching_dir(marching, tmp_path_factory):
+    path = tmp_path_factory.mktemp("march") / "bundle"
+    write_bundle(path, marching)
+    return path

@@ -96,7 +96,7 @@ class Policies:
             target = self._follow_ramp(packet, command, t)
         elif packet["runs"]:
             target, fault = self._run(packet, command)
-            self._look_for_upright(packet, t)
+            self._look_for_upright(packet, target, t)
         tick, challenge = int(packet["tick"]), int(packet["challenge"])
         proposal = Proposal(
             tick, complement(challenge), np.asarray(target, np.float64), age_s, fault
@@ -172,7 +172,7 @@ class Policies:
             Moment(packet["pos"], down, packet["gyro"], command, asked_rad)
         )
 
-    def _look_for_upright(self, packet: np.void, t: float) -> None:
+    def _look_for_upright(self, packet: np.void, target: Array, t: float) -> None:
         """Recovery is over once the hand is upright: settle, then the first policy."""
         manifest = self._controllers[self._active].bundle.manifest
         if manifest.task != RECOVERY or self._active == 0:
@@ -182,12 +182,11 @@ class Policies:
         self._upright_s, upright = upright_step(self._upright_s, tilt, speed, t)
         if upright:
             first = self._controllers[0].bundle.manifest.interface
-            start = np.asarray(packet["target"], np.float64)
             goal = np.asarray(first.initial_target_rad, np.float64)
             action = manifest.interface.action
             speed = _RAMP_SHARE * action.scale_rad * first.control_rate_hz
-            duration = ramp_duration(start, goal, SETTLE_S, speed)
-            self._ramp = Ramp(t, start, goal, duration)
+            duration = ramp_duration(target, goal, SETTLE_S, speed)
+            self._ramp = Ramp(t, target, goal, duration)
 
     def _follow_ramp(self, packet: np.void, command: NDArray, t: float) -> Array:
         ramp = self._ramp

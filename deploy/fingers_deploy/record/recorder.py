@@ -122,5 +122,6 @@ class Recorder:
             if self._writer.size > MAX_FILE_BYTES:
                 self._writer.close()
                 self._writer = self._open()
+        self._writer.flush()
         self._writer.add_metadata("fingers_summary", self._summary)
         self._writer.close()

@@ -67,6 +67,8 @@ def serve(link: socket.socket, policies: Policies | Plan) -> None:
                 data = link.recv(OBSERVATION.itemsize)
             except BlockingIOError:
                 break
+            except OSError:
+                return
             if len(data) != OBSERVATION.itemsize:
                 return
             newest = data

@@ -20,6 +20,7 @@ from fingers_deploy.safety.wiggle import (
 Array = NDArray[np.float64]
 ALL_JOINTS = tuple(range(JOINT_COUNT))
 ENABLE_S = 1.0  # longest wait for the hand to confirm that it is energized
+YIELD_S = 0.5  # a standing hand gives a little when it takes its own weight
 REST_S = 0.2  # pause at the rest pose before the policy begins
 RAMP_SPEED_RAD_S = 1.0
 
@@ -92,7 +93,7 @@ def _enable(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progres
         found["S20"] = f"fast and slow angle of joint {worst} differ {apart[worst]:.3f}"
     elif t - arming.since_s > ENABLE_S:
         found["S20"] = "the hand did not confirm that it is energized"
-    elif health.enabled and health.t_s >= arming.since_s:
+    elif health.enabled and t - arming.since_s >= YIELD_S:
         start = arming.start_rad
         wiggle = start_wiggle(
             arming.wiggle.joints, start, reading.pos_rad, t, limits.allowed_rad

@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 AMPLITUDE_RAD = 0.05
 FOLLOWED_RAD = 0.025  # the moved joint must get at least half way
-OTHERS_RAD = 0.02  # and no other may move by more
+OTHERS_RAD = 0.03  # and no other may move by more; a standing hand gives a little
 _RAMP_S, _OUT_S, _BACK_S = 0.1, 0.45, 0.35
 
 

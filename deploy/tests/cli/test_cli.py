@@ -1,0 +1,150 @@
+import contextlib
+import json
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from fuzz_bundles import measure as damage_bundles
+
+from fingers_deploy.cli.main import main
+from fingers_deploy.record import read_log
+
+
+def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
+    main(["check", str(bundle_dir)])
+    said = capsys.readouterr().out
+    for word in (
+        "crawl, 50 Hz",
+        "8 known answers",
+        "joint_pos[20]x8",
+        "finger5_joint4",
+    ):
+        assert word in said
+    assert "ms of one core per step" in said
+
+
+def test_check_survives_a_runtime_that_dies_when_imported(
+    bundle_dir, capsys, monkeypatch
+):
+    import fingers_deploy.cli.check as module
+
+    monkeypatch.setattr(module, "_PROBE", "import os; os.abort()")
+    main(["check", str(bundle_dir)])
+    assert "not usable here" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["check", "nowhere"], "nowhere"),
+        (["run", "nowhere", "--driver", "sim", "--model", "x"], "nowhere"),
+        (["run", "BUNDLE", "--driver", "sim"], "--model"),
+        (["run", "BUNDLE", "--driver", "replay"], "--log"),
+        (["run", "BUNDLE", "--driver", "wuji", "--arm"], "typing arm"),
+        (["run", "BUNDLE", "--driver", "sim", "--model", "x", "--loop-hz", "7"], "50"),
+        (["run", "BUNDLE", "--driver", "sim", "--model", "nowhere.xml"], "nowhere.xml"),
+        (["log", "nowhere"], "nowhere"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_status_2(bundle_dir, capsys, arguments, words):
+    assert main([a.replace("BUNDLE", str(bundle_dir)) for a in arguments]) == 2
+    said = capsys.readouterr()
+    assert said.out == "" and len(said.err.splitlines()) == 1 and words in said.err
+
+
+def test_damaged_bundles_are_refused_before_anything_is_opened():
+    result = damage_bundles(300, seed=1)
+    assert result["accepted"] == 0 and result["not_one_line"] == 0
+
+
+@pytest.mark.slow
+def test_ten_thousand_damaged_bundles():
+    result = damage_bundles(10_000, seed=2)
+    print(json.dumps(result))
+    assert result["accepted"] == 0 and result["not_one_line"] == 0
+
+
+def test_a_bundle_that_is_an_archive_is_refused_not_unpacked(tmp_path, capsys):
+    import zipfile
+
+    path = tmp_path / "bundle.zip"
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("../outside", "x")
+    assert main(["check", str(path)]) == 2
+    assert list(tmp_path.iterdir()) == [path]
+    assert "SHA-256" in capsys.readouterr().err
+
+
+def _run(*arguments):
+    return subprocess.run(
+        [sys.executable, "-m", "fingers_deploy", *map(str, arguments)],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=120,
+        check=False,
+    )
+
+
+@pytest.fixture(scope="module")
+def recorded(hand_model, marching_dir, tmp_path_factory):
+    """A whole run from the command line: processes, socket, recording."""
+    out = tmp_path_factory.mktemp("run")
+    arguments = ["run", marching_dir, "--driver", "sim", "--model", hand_model, "--arm"]
+    arguments += ["--wiggle", "one", "--duration", "6", "--sticks", "1", "0", "0"]
+    done = _run(*arguments, "--out", out)
+    return done, next(out.glob("*.mcap"))
+
+
+def test_a_run_from_the_command_line(recorded):
+    done, file = recorded
+    assert done.stderr == ""
+    log = read_log(file)
+    lines = [line for _, line in log.events]
+    assert "arming -> active" in lines, done.stdout
+    assert log.complete and lines[-1].startswith("de-energized")
+    # A loaded machine may stop the hand, never crash: 0, or 5 and a fault's name.
+    assert done.returncode == 0 or (done.returncode == 5 and "-> hold" in done.stdout)
+    assert "control steps" in done.stdout
+
+
+def test_a_recording_converts_to_csv(recorded, tmp_path, capsys):
+    _, file = recorded
+    out = tmp_path / "run.csv"
+    assert main(["log", str(file), "--csv", str(out)]) == 0
+    header, *lines = out.read_text().splitlines()
+    table = np.array([line.split(",") for line in lines], float)
+    columns = dict(zip(header.split(","), table.T, strict=True))
+    rows = read_log(file).rows
+    np.testing.assert_array_equal(
+        columns["pos.finger3_joint2"].astype(np.float32), rows["pos"][:, 9]
+    )
+    assert main(["log", str(file), "--csv", str(out)]) == 2  # never written over
+
+
+def test_a_recording_replays_as_a_dry_run(recorded, marching_dir, tmp_path):
+    _, file = recorded
+    arguments = ["run", marching_dir, "--driver", "replay", "--log", file, "--arm"]
+    done = _run(*arguments, "--wiggle", "none", "--duration", "3", "--out", tmp_path)
+    assert "Traceback" not in done.stderr
+    assert done.returncode in (0, 5, 6)
+
+
+def test_the_policy_of_another_hand_order_is_refused_by_the_supervisor(
+    hand_model, marching_dir, bundle_dir
+):
+    """Two bundles that cannot be switched between: nothing starts."""
+    arguments = ["run", marching_dir, bundle_dir, "--driver", "sim"]
+    done = _run(*arguments, "--model", hand_model, "--no-record", "--arm")
+    assert done.returncode == 2
+    assert "interface.v_quat_b" in done.stderr
+    assert "Traceback" not in done.stderr
+
+
+def test_help_says_what_there_is():
+    said = _run("--help").stdout
+    for word in ("check", "run", "record", "guard", "log"):
+        assert word in said
+    with contextlib.suppress(SystemExit):
+        main(["run", "--help"])

@@ -1,0 +1,116 @@
+import re
+
+import numpy as np
+import pytest
+
+from fingers_deploy.drivers.sim import SimDriver, SimulatorProcess
+from fingers_deploy.errors import InputError
+from fingers_deploy.runtime.guard import make_safe
+from fingers_deploy.simulator.command_path import CommandPath
+from fingers_deploy.simulator.hand import SimulatedHand
+
+FREE = '<joint name="root" type="free"/>'
+HINGE = '<joint name="root" type="hinge" axis="0 0 1"/>'
+
+
+@pytest.fixture(scope="module")
+def interface(marching):
+    return marching.manifest.interface
+
+
+def test_lockstep_is_exact_and_repeatable(hand_model, interface):
+    target = np.asarray(interface.initial_target_rad)
+    ends = []
+    for _ in range(2):
+        with SimulatorProcess(hand_model, interface, lockstep=True, seed=4) as process:
+            driver = SimDriver(process.path, interface, lockstep=True)
+            driver.advance(0.0)
+            assert driver.health().disabled
+            driver.enable()
+            driver.write(target)
+            driver.advance(0.5)
+            assert driver.read().t_s == pytest.approx(0.5)
+            assert driver.health().enabled
+            ends.append(driver.state.tobytes())
+            driver.close()
+    assert ends[0] == ends[1]
+
+
+def test_in_real_time_it_holds_the_last_target_until_a_guard_comes(
+    hand_model, interface
+):
+    with SimulatorProcess(hand_model, interface, lifetime_s=30.0) as process:
+        driver = SimDriver(process.path, interface)
+        driver.enable()
+        driver.write(np.asarray(interface.initial_target_rad))
+        driver._socket.close()  # as when its process dies
+        second = SimDriver(process.path, interface)
+        assert make_safe(second)
+        second.close()
+
+
+def test_a_simulator_that_goes_away_is_an_error(hand_model, interface):
+    process = SimulatorProcess(hand_model, interface)
+    driver = SimDriver(process.path, interface)
+    process.close()
+    with pytest.raises(OSError):
+        for _ in range(100):
+            driver.read()
+            driver.write(np.zeros(20))
+    driver.close()
+
+
+def test_de_energized_joints_hold_by_friction_and_do_not_follow(hand_model, interface):
+    hand = SimulatedHand(hand_model, interface.joint_names)
+    before = hand.data.qpos[7:].copy()
+    hand.target_rad = before + 0.5
+    hand.advance(0.5)
+    assert np.abs(hand.data.qpos[7:] - before).max() < 0.05
+    hand.set_enabled(True)
+    hand.advance(1.5)
+    assert np.abs(hand.data.qpos[7:] - before).max() > 0.3
+
+
+def test_command_path_delays_filters_and_limits():
+    zero, one = np.zeros(20), np.ones(20)
+    path = CommandPath(zero, 0.005, 0.02, None, None)
+    assert [path.step(one)[0] for _ in range(6)] == [0, 0, 0, 0, 1, 1]
+    path = CommandPath(zero, 0.001, 0.0, 3.0, None)
+    steps = round(1 / (2 * np.pi * 3.0) / 0.001)
+    values = [path.step(one)[0] for _ in range(steps)]
+    assert values[-1] == pytest.approx(1 - np.exp(-1), abs=0.005)
+    path = CommandPath(zero, 0.005, 0.0, None, 2.0)
+    np.testing.assert_allclose(path.step(one), 0.01)
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.replace("<mujoco", "<mojoco", 1), "MJCF"),
+        (lambda t: t.replace("finger3_joint2", "other_joint"), "finger3_joint2"),
+        (lambda t: t.replace('timestep="0.005"', 'timestep="-1"'), "timestep"),
+        (
+            lambda t: t.replace("</worldbody>", '<include file="/etc/passwd"/>'),
+            "another",
+        ),
+        (lambda t: re.sub("<key .*/>", "", t).replace(FREE, HINGE), "free root"),
+        (lambda t: "", "MJCF"),
+        (lambda t: "\0", "MJCF"),
+    ],
+)
+def test_bad_models_are_refused_in_one_sentence(
+    hand_model, interface, tmp_path, change, words
+):
+    text = hand_model.read_text()
+    changed = change(text)
+    assert changed != text
+    path = tmp_path / "hand.xml"
+    path.write_text(changed)
+    with pytest.raises(InputError, match=words) as caught:
+        SimulatedHand(path, interface.joint_names)
+    assert "\n" not in str(caught.value)
+
+
+def test_the_process_tells_why_it_refuses(interface, tmp_path):
+    with pytest.raises(InputError, match="nowhere"):
+        SimulatorProcess(tmp_path / "nowhere.xml", interface)

@@ -1,0 +1,211 @@
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from fingers_deploy.runtime.console import ConsoleLink
+from fingers_deploy.runtime.launcher import notify
+from fingers_deploy.runtime.link import (
+    ANSWER,
+    OBSERVATION,
+    SupervisorEnd,
+    decode_answer,
+    encode_answer,
+    make_link,
+)
+from fingers_deploy.runtime.stats import LoopStats, Timing
+from fingers_deploy.runtime.ticker import Ticker
+from fingers_deploy.safety import Operator, PolicyFault, Proposal
+
+
+class Fake:
+    """A clock that sleeping moves, by exactly what was asked and a little more."""
+
+    def __init__(self, oversleep=0.0):
+        self.t, self.oversleep = 50.0, oversleep
+
+    def __call__(self):
+        return self.t
+
+    def sleep(self, seconds):
+        assert seconds > 0
+        self.t += seconds + self.oversleep
+
+
+def test_deadlines_are_absolute_and_do_not_drift():
+    clock = Fake(oversleep=0.0003)
+    ticker = Ticker(0.02, clock, clock.sleep)
+    for k in range(1, 2000):
+        clock.t += 0.0037  # work
+        tick = ticker.wait()
+        assert (tick.number, tick.skipped) == (k, 0)
+        assert tick.late_s == pytest.approx(0.0003, abs=1e-9)
+        assert tick.t_s == pytest.approx(50.0 + 0.02 * k + 0.0003, abs=1e-9)
+
+
+def test_missed_deadlines_are_skipped_never_caught_up():
+    clock = Fake()
+    ticker = Ticker(0.02, clock, clock.sleep)
+    ticker.wait()
+    clock.t += 0.107
+    tick = ticker.wait()
+    assert (tick.number, tick.skipped) == (6, 4)
+    assert tick.late_s == pytest.approx(0.007)
+    times = [ticker.wait() for _ in range(5)]
+    assert [t.number for t in times] == [7, 8, 9, 10, 11]
+    assert all(t.skipped == 0 for t in times)
+    gaps = np.diff([t.t_s for t in times])
+    np.testing.assert_allclose(gaps, 0.02, atol=1e-9)
+
+
+def test_a_little_late_is_not_skipped():
+    clock = Fake()
+    ticker = Ticker(0.02, clock, clock.sleep)
+    ticker.wait()
+    clock.t += 0.0399
+    tick = ticker.wait()
+    assert (tick.number, tick.skipped) == (2, 0)
+    assert tick.late_s == pytest.approx(0.0199)
+
+
+def test_timing_quantiles_and_counts():
+    timing, rng = Timing(), np.random.default_rng(4)
+    values = rng.exponential(0.002, 5000)
+    for value in values:
+        timing.add(value)
+    for share in (0.5, 0.99, 0.999):
+        assert timing.quantile(share) == pytest.approx(
+            np.quantile(values, share), abs=2e-4
+        )
+    assert timing.above(0.005) == (values >= 0.005).sum()
+    assert timing.worst_s == values.max() and timing.count == 5000
+    timing.add(7.0)
+    timing.add(-1.0)
+    assert timing.worst_s == 7.0 and timing.count == 5002
+
+
+def test_more_than_one_percent_of_late_steps_warns():
+    stats = LoopStats()
+    for k in range(1000):
+        stats.step(0.006 if k % 125 == 0 else 0.0, 0)
+    assert not stats.warning
+    for k in range(500):
+        stats.step(0.006 if k % 50 == 0 else 0.0, 0)
+    assert stats.warning
+    stats.step(0.0, 3)
+    assert stats.summary()["skipped"] == 3
+
+
+def test_link_carries_answers_and_keeps_the_newest():
+    left, right = make_link()
+    end = SupervisorEnd(left)
+    assert end.poll() is None and end.open
+    for tick in (1, 2):
+        proposal = Proposal(tick, tick + 7, np.arange(20.0) + tick, 0.25)
+        right.send(encode_answer(proposal, np.array([0.1, 0.2], np.float32), 1))
+    answer = end.poll()
+    assert (answer.proposal.tick, answer.proposal.response, answer.policy) == (2, 9, 1)
+    np.testing.assert_array_equal(answer.proposal.target_rad, np.arange(20.0) + 2)
+    assert answer.proposal.command_age_s == 0.25
+    right.close()
+    assert end.poll() is None and not end.open
+
+
+def test_a_link_that_nobody_reads_blocks_nothing():
+    left, right = make_link()
+    end, packet = SupervisorEnd(left), np.zeros((), OBSERVATION)
+    start = time.perf_counter()
+    for _ in range(5000):
+        end.send(packet)
+    assert time.perf_counter() - start < 5 and end.open
+    right.close()
+    end.send(packet)
+    assert not end.open
+
+
+def test_half_an_answer_and_noise_are_no_proposal():
+    left, right = make_link()
+    end, rng = SupervisorEnd(left), np.random.default_rng(0)
+    right.send(b"half")
+    assert end.poll() is None
+    for _ in range(300):
+        answer = decode_answer(rng.bytes(ANSWER.itemsize))
+        assert len(answer.proposal.target_rad) <= 20
+        assert isinstance(answer.proposal.fault, PolicyFault)
+
+
+def test_partial_answers_keep_their_length():
+    data = encode_answer(Proposal(1, 2, np.zeros(7)), np.zeros(0, np.float32), 0)
+    assert decode_answer(data).proposal.target_rad.shape == (7,)
+
+
+def test_console_actions_and_its_loss():
+    left, right = make_link()
+    console = ConsoleLink(left)
+    assert console.poll() == Operator.NONE
+    for word in ("policy 3", "nonsense", "arm"):
+        right.send(word.encode())
+    assert console.poll() == Operator.ARM and console.selected == 3
+    console.tell({"mode": "active"})
+    assert right.recv(100) == b'{"mode": "active"}'
+    right.close()
+    assert console.poll() == Operator.STOP and console.quitting
+
+
+def test_systemd_is_told(tmp_path):
+    path = str(tmp_path / "notify")
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+        end.bind(path)
+        notify(path, "WATCHDOG=1")
+        assert end.recv(100) == b"WATCHDOG=1"
+    notify(str(tmp_path / "nobody"), "WATCHDOG=1")
+
+
+_PREFER = """
+import gc, os, sys, threading, time
+threading.Thread(target=time.sleep, args=(5,), daemon=True).start()
+from fingers_deploy.runtime.realtime import prefer_this_process
+if sys.argv[1] == "refused":
+    def refuse(*args):
+        raise PermissionError(1, "Operation not permitted")
+    os.sched_setscheduler = refuse
+print(prefer_this_process(ask=sys.argv[1] != "unasked"))
+print(gc.isenabled(), gc.get_freeze_count() > 0)
+ids = [t.native_id for t in threading.enumerate()]
+print(*(os.sched_getscheduler(i) for i in ids))
+"""
+
+
+@pytest.mark.parametrize("case", ["asked", "refused", "unasked"])
+def test_what_was_obtained_is_reported(case):
+    done = subprocess.run(
+        [sys.executable, "-c", _PREFER, case],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    said, collector, policies = done.stdout.splitlines()
+    assert collector == "False True"
+    if case != "asked":
+        assert said.startswith("no real-time priority (")
+        assert policies == "0 0"
+    else:
+        obtained = policies == f"{os.SCHED_FIFO} {os.SCHED_FIFO}"
+        assert said == "SCHED_FIFO 50" if obtained else "no real-time" in said
+
+
+def test_an_interrupt_does_not_reach_the_hand_first():
+    program = (
+        "import os, signal;"
+        "from fingers_deploy.runtime.signals import ignore_interrupts;"
+        "ignore_interrupts(); os.kill(os.getpid(), signal.SIGINT); print('alive')"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True
+    )
+    assert done.stdout == "alive\n" and done.returncode != -signal.SIGINT

@@ -1,0 +1,108 @@
+"""The fault matrix, small; `make test-slow` runs the large one."""
+
+import numpy as np
+import pytest
+from fault_lab import Lab, snapshots
+from fault_links import LOSSES, burst, measure_loss
+from fault_processes import SIGNALS, WITHIN_S, kill_one
+from fault_scenarios import SCENARIOS
+from fault_startup import STARTS, start_up, stopped_rightly
+from fault_trials import passes, run_trial
+
+from fingers_deploy.safety import ROWS, Mode
+
+SEED = 500
+FAST, SLOW = 20, 100
+ELSEWHERE = {"S17", "S20", "OP"}  # of the table's rows: starts, and test_rows
+IDS = [f"{s.row} {s.name}" for s in SCENARIOS]
+
+
+@pytest.fixture(scope="module")
+def starts(hand_model, marching):
+    lab = Lab(hand_model, (marching,), loop_hz=250).activate().run(1.0)
+    return snapshots(lab, 20, 0.13)
+
+
+@pytest.fixture(scope="module")
+def fast_starts(hand_model, marching):
+    lab = Lab(hand_model, (marching,), loop_hz=500).activate().run(1.0)
+    return snapshots(lab, 20, 0.13)
+
+
+def _check(starts, scenario, trials, seed):
+    lab = starts[0]
+    for k in range(trials):
+        trial = run_trial(starts[k % len(starts)], scenario, seed + k)
+        assert passes(trial, scenario, lab.core.limits.step_rad, lab.period_s), trial
+
+
+def test_every_row_is_in_the_matrix():
+    assert {s.row for s in SCENARIOS} | ELSEWHERE == {row.id for row in ROWS} | {"S19"}
+
+
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=IDS)
+def test_the_matrix(starts, scenario):
+    _check(starts, scenario, FAST, SEED)
+
+
+def test_a_supervisor_that_sleeps_would_fail(starts):
+    """Negative control: with its limits off, the trials do not pass."""
+    import copy
+    from dataclasses import replace
+
+    lab = copy.deepcopy(starts[0])
+    off = replace(lab.core.limits, obs_age_s=9.0, lease_s=9.0, frozen_imu_s=9.0)
+    lab.core._limits = (off,)
+    for name in ("late joints", "policy hangs", "frozen IMU"):
+        scenario = next(s for s in SCENARIOS if s.name == name)
+        trial = run_trial(lab, scenario, SEED)
+        assert not passes(trial, scenario, 0.06, lab.period_s)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=IDS)
+def test_the_matrix_large(fast_starts, scenario):
+    print(f"seeds {SEED} to {SEED + SLOW - 1}")
+    _check(fast_starts, scenario, SLOW, SEED)
+
+
+@pytest.mark.parametrize("name", STARTS)
+def test_faulty_starts(hand_model, marching, name):
+    for seed in range(3):
+        start = start_up(hand_model, marching, name, seed, 250)
+        assert stopped_rightly(start, name), start
+
+
+@pytest.mark.parametrize("share", LOSSES)
+def test_packet_loss(fast_starts, share):
+    assert measure_loss(fast_starts[0], share, 4.0, SEED).trips == 0
+
+
+def test_bursts(starts):
+    assert burst(starts[0], 0.030)[1] == Mode.ACTIVE
+    reaction, end = burst(starts[0], 0.060)
+    assert reaction <= 0.080 and end == Mode.STOPPING
+    assert burst(starts[0], 0.500)[1] == Mode.SAFE
+
+
+def test_no_false_stop(starts):
+    import copy
+
+    lab = copy.deepcopy(starts[3])
+    lab.run(20.0)
+    assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
+    heights = lab.driver.hand.data.qpos[2]
+    assert np.isfinite(heights) and heights > 0.1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SIGNALS)
+def test_processes_that_die(hand_model, marching_dir, name):
+    for seed in range(5):
+        death = kill_one(hand_model, marching_dir, name, seed)
+        assert death.safe and death.reaction_s <= WITHIN_S[name.split()[0]]
+
+
+def test_a_supervisor_that_is_killed_leaves_a_safe_hand(hand_model, marching_dir):
+    death = kill_one(hand_model, marching_dir, "S13 supervisor killed (SIGKILL)", 0)
+    assert death.safe
