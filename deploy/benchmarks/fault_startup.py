@@ -21,7 +21,8 @@ class Start:
 
     Attributes:
         active: the policy ran in the end.
-        rows: faults that were latched, or checks that failed.
+        rows: faults that were latched, `preflight` if a check failed, `refused` if
+            arming was.
         step_rad: largest change of a target from one step to the next while arming,
             the first target against the measured pose.
     """
@@ -55,10 +56,10 @@ def _no_power(lab: Lab, rng: np.random.Generator) -> None:
 
 
 def _far_pose(lab: Lab, rng: np.random.Generator) -> None:
-    """Every joint is up to 0.3 rad away from its target, the hand in the air."""
+    """Every joint is up to 0.2 rad away from its target, the hand in the air."""
     hand = lab.driver.hand
     low, high = hand.joint_limits_rad.T
-    away = lab.core.limits.rest_rad + rng.uniform(-0.3, 0.3, 20)
+    away = lab.core.limits.rest_rad + rng.uniform(-0.2, 0.2, 20)
     hand.data.qpos[hand._qpos] = np.clip(away, low, high)
     hand.data.qpos[2] += 0.3
     hand.model.opt.gravity[:] = 0.0
@@ -75,7 +76,7 @@ def _other_order(lab: Lab, rng: np.random.Generator) -> None:
 
 
 # A wrong hand pushes against itself, or falls, before the wiggle test gets to it.
-_WRONG = {"S17", "S5", "S7", "S8", "S8b"}
+_WRONG = {"S17", "S5", "S7", "S8", "S8b", "preflight", "refused"}
 STARTS: dict[str, tuple[set[str], Callable, bool]] = {
     "S17 two joints swapped": (_WRONG, _swapped, False),
     "S17 left hand": (_WRONG, _left_hand, False),
@@ -108,6 +109,8 @@ def start_up(model: Path, bundle: Bundle, name: str, seed: int, hz: float) -> St
     latched = [fault.id for fault in lab.core.state.faults]
     if not all(check.passed for check in lab.core.checks):
         latched.append("preflight")
+    if any("arm refused" in line for _, line in lab.events):
+        latched.append("refused")
     return Start(lab.mode == Mode.ACTIVE, " ".join(latched), step)
 
 
