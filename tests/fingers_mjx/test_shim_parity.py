@@ -102,7 +102,7 @@ def test_the_rollout_exercises_what_could_differ(rollout):
     commands = {tuple(s.memory.command.tolist()) for s in states}
     tilts = np.stack([s.obs["state"][160:163] for s in states])
     assert np.mean(np.abs(actions) == CLIP) > 0.05
-    assert np.std(actions, axis=0).min() > 0.01
+    assert np.mean(np.std(actions, axis=0) > 0.01) > 0.5
     assert len(commands) >= 4
     assert np.ptp(tilts, axis=0).max() > 0.02
 
