@@ -40,9 +40,14 @@ demo: sync ## The walking hand: evaluate, play, train, export, one report
 bench: sync ## Speed of physics, environment and PPO on this machine
 	$(RUN) python benchmarks/throughput.py
 
-build: sync ## Wheels, and the quick tests against them in an environment of their own
-	rm -rf dist
+build: sync ## Wheels, installed and tried in an environment of their own
+	rm -rf dist build/trial
 	$(UV) build --quiet --all-packages --wheel
+	$(UV) venv --quiet --python 3.11 build/trial
+	$(UV) pip install --quiet --python build/trial dist/fingers_deploy-*.whl \
+		"$$(echo dist/fingers_mjx-*.whl)[viz]"
+	cd build && trial/bin/fingers hand show --out trial/hand
+	cd build && trial/bin/python -c 'import fingers_deploy, rewards, envs, sysid, fingers_mjx'
 
 clean: ## Remove caches and builds; runs and the environment stay
 	rm -rf .pytest_cache .ruff_cache .hypothesis .jax_cache build dist deploy/build
