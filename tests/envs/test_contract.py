@@ -176,6 +176,17 @@ def test_a_state_that_is_not_finite_ends_its_episode_and_is_counted(
     assert not np.asarray(after.info["invalid"]).any()
 
 
+def test_an_invalid_last_step_is_not_a_time_limit(task):
+    data = task.first.data
+    bad = data.replace(qvel=data.qvel.at[1, 7].set(np.nan))
+    last = at_last_step(task, task.first.replace(data=bad))
+    state = task.step(last, task.actions(1)[0])
+    np.testing.assert_array_equal(state.done, 1)
+    hit = np.arange(task.batch.num_envs) == 1
+    np.testing.assert_array_equal(state.info["truncation"], ~hit)
+    np.testing.assert_array_equal(state.info["invalid"], hit)
+
+
 def test_a_nan_action_is_an_invalid_step_and_an_infinite_one_a_full_one(task):
     action = task.actions(1)[0]
     action[0, 3], action[1, 3], action[2, 3] = np.nan, np.inf, -np.inf
@@ -204,10 +215,20 @@ def test_weights_are_arguments_of_the_compiled_step(task):
 
 
 def test_no_call_after_the_first_compiles_anything(task, rollout):
-    """Includes calls from the reset, from a step and from an automatic restart."""
-    assert task.step._cache_size() == 1
-    task.step(task.reset(jax.random.key(3)), task.actions(1)[0])
-    assert task.step._cache_size() == 1 and task.reset._cache_size() == 1
+    """Neither from the reset, nor from a step, nor from an automatic restart."""
+    key, action = jax.random.key(3), task.actions(1)[0]
+    ending = at_last_step(task, rollout[-1])
+    events = []
+    jax.monitoring.register_event_duration_secs_listener(
+        lambda name, *_, **__: events.append(name) if "compile" in name else None
+    )
+    state = task.step(task.reset(key), action)
+    state = task.step(state, action)
+    restarted = task.step(ending, action)
+    state = task.step(restarted, action)
+    assert events == []
+    jax.jit(lambda x: x * 3.5)(jnp.ones(11))  # negative control: this one compiles
+    assert events != []
 
 
 def test_a_world_does_not_depend_on_how_many_are_stepped(task, rollout, make_compiled):
