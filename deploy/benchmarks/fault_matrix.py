@@ -100,7 +100,7 @@ def measure(options: argparse.Namespace, folder: Path) -> dict:
         print(results["matrix"][-1], file=sys.stderr)
     hz = options.loop_hz
     results["starts"] = [
-        measure_start(model, bundle, name, options.trials, hz) for name in STARTS
+        measure_start(model, bundle, name, options.start_trials, hz) for name in STARTS
     ]
     results["losses"] = [
         vars(measure_loss(starts[0], share, options.loss_s, options.seed))
@@ -194,6 +194,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bundle", help="a trained policy")
     parser.add_argument("--trials", type=int, default=20)
+    parser.add_argument("--start-trials", type=int, default=20)
     parser.add_argument("--process-trials", type=int, default=3)
     parser.add_argument("--hours", type=float, default=0.05)
     parser.add_argument("--loss-s", type=float, default=30.0)

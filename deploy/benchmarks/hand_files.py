@@ -2,8 +2,11 @@
 
 A trained policy is better; this one needs no training: a clipped linear oscillator over
 its own previous actions, which lifts the fingers in turn.
+
+    python deploy/benchmarks/hand_files.py --model hand.xml --bundle march
 """
 
+import argparse
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +25,7 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.bundle import encode_bundle
+from fingers_mjx.bundle import encode_bundle, write_bundle
 from fingers_mjx.onnx_graph import PolicyWeights
 
 HISTORY = 8
@@ -84,3 +87,19 @@ def marching_bundle(task: str = "crawl") -> Bundle:
     action = np.clip(obs @ layers[0][0] + layers[0][1], -CLIP, CLIP)
     provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
     return encode_bundle(weights, task, hand_interface(), provenance, (obs, action))
+
+
+def main() -> None:
+    """Writes the model, and the policy that marches, to the given paths."""
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--model", type=Path, help="MJCF file to write")
+    parser.add_argument("--bundle", type=Path, help="folder of the policy to write")
+    options = parser.parse_args()
+    if options.model:
+        write_model(options.model)
+    if options.bundle:
+        write_bundle(options.bundle, marching_bundle())
+
+
+if __name__ == "__main__":
+    main()
