@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import NoReturn
 
 MAX_SEED = 2**32 - 1
-STANCE_STARTS = 16
+STANCE_STARTS = 40
 """Starts with which the stored stance was found."""
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 

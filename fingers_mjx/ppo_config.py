@@ -109,8 +109,13 @@ def paper() -> TrainConfig:
 
 
 def fast() -> TrainConfig:
-    """Returns settings for one GPU: twice the worlds, fewer iterations."""
-    return TrainConfig(preset="fast", num_envs=8192, iterations=3000)
+    """Returns settings for one GPU: a gait within minutes.
+
+    Less noise at the start lets the hand stand before the lift reward drives it, and
+    more, smaller iterations learn faster than fewer with twice the worlds.
+    """
+    ppo = PpoConfig(init_noise_std=0.5)
+    return TrainConfig(preset="fast", num_envs=4096, iterations=3000, ppo=ppo)
 
 
 def cpu() -> TrainConfig:

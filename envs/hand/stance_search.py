@@ -32,12 +32,16 @@ class StanceWeights:
 
     Attributes:
         margin: shortfall of the static margin below 30 mm, per 10 mm.
+        one_lifted: shortfall of the margin below 10 mm with any one finger lifted, per
+            10 mm. Without it the finger that the hand leans on is dragged, not lifted.
         range: distance of each joint from the middle of its range, per range.
         pad: pad normals above 10° below the horizontal, per 30°.
         clearance: shortfall of the other links' height below 20 mm, per 10 mm.
         step: radians that move a tip 20 mm forward or 15 mm up, per 0.5 rad.
         torque: static joint torque, per torque limit.
         spread: shortfall of the distance of neighbouring tips below 24 mm, per 6 mm.
+        order: shortfall of the sideways distance from each of the four fingers to the
+            next below 12 mm, per 4 mm; fingers do not cross.
         centre: horizontal distance from the footprint's centre to the centre of mass,
             per 20 mm.
         height: shortfall of the palm's lowest corner below 45 mm, per 10 mm.
@@ -45,12 +49,14 @@ class StanceWeights:
     """
 
     margin: float = 10.0
+    one_lifted: float = 5.0
     range: float = 1.0
-    pad: float = 1.0
+    pad: float = 2.0
     clearance: float = 3.0
-    step: float = 1.0
+    step: float = 1.5
     torque: float = 2.0
     spread: float = 2.0
+    order: float = 5.0
     centre: float = 0.5
     height: float = 1.0
     roll: float = 1.0
@@ -142,12 +148,14 @@ class StanceProblem:
         gaps = [np.linalg.norm(tips[i] - tips[j]) for i, j in _NEIGHBOURS]
         parts = [
             w.margin * _short(support_margins(com[:2], tips[:, :2]), 0.030, 0.010),
+            w.one_lifted * _short(lifted_margins(com[:2], tips[:, :2]), 0.010, 0.010),
             w.range * (x[3:] - (self.low + self.high) / 2) / (self.high - self.low),
             w.pad * _short(-self._pad_tilt(), np.deg2rad(10), np.deg2rad(30)),
             w.clearance * _short(self._link_heights(), 0.020, 0.010),
             w.step * _step_effort(jacobians) / 0.5,
             w.torque * self._static_torque(jacobians, tips, com) / self._torque_limit(),
             w.spread * _short(np.array(gaps), 0.024, 0.006),
+            w.order * _short(-np.diff(tips[1:, 1]), 0.012, 0.004),
             w.centre * (com[:2] - tips[:, :2].mean(0)) / 0.020,
             w.height * _short(np.array([self._palm_height()]), 0.045, 0.010),
             w.roll * np.array([x[1]]) / np.deg2rad(10),
@@ -195,16 +203,33 @@ class StanceProblem:
 
 
 def support_margins(
-    point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "5 2"]
-) -> Float[np.ndarray, "5"]:
-    """Signed distances [m] of a point to the footprint's edges, inside positive."""
-    start = tips[_HULL]
+    point: Float[np.ndarray, "2"],
+    tips: Float[np.ndarray, "5 2"],
+    lifted: int | None = None,
+) -> Float[np.ndarray, " n"]:
+    """Signed distances [m] of a point to the footprint's edges, inside positive.
+
+    Args:
+        point: such as the centre of mass on the floor [m].
+        tips: of the five fingers on the floor [m].
+        lifted: finger that does not support; none if not given.
+    """
+    start = tips[[finger for finger in _HULL if finger != lifted]]
     edge = np.roll(start, -1, axis=0) - start
     area = np.sum(start[:, 0] * np.roll(start[:, 1], -1))
     area -= np.sum(np.roll(start[:, 0], -1) * start[:, 1])
     normal = np.stack([-edge[:, 1], edge[:, 0]], axis=1) * np.sign(area)
     normal /= np.linalg.norm(edge, axis=1, keepdims=True) + 1e-9
     return np.sum(normal * (point - start), axis=1)
+
+
+def lifted_margins(
+    point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "5 2"]
+) -> Float[np.ndarray, "5"]:
+    """Least margin [m] of a point on the other four tips, with each finger lifted."""
+    return np.array(
+        [support_margins(point, tips, lifted).min() for lifted in range(len(FINGERS))]
+    )
 
 
 def palm_quat(pitch_rad: float, roll_rad: float) -> Float[np.ndarray, "4"]:
