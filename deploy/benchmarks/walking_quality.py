@@ -3,8 +3,8 @@
     python deploy/benchmarks/walking_quality.py --bundle policies/crawl --out OUT
 
 writes `<out>.png` and `<out>.json`. Quality is that of the policy with the supervisor's
-limits on age and freezing off; where the supervisor as it is stops the hand, the point is
-marked.
+limits on age and freezing off; where the supervisor as it is stops the hand, the point
+is marked.
 """
 
 import argparse
