@@ -75,3 +75,25 @@ def test_settings_in_the_training_guide_exist():
     (given,) = re.findall(r"`--set ([^`]+)`", text)
     made = overridden(new_setup(TrainConfig(), None), given.split())
     assert (made.train.num_envs, made.env.curriculum_scale) == (2048, 0.25)
+
+
+def test_presets_in_the_training_guide_are_those_of_the_code():
+    from fingers_mjx.ppo_config import PRESETS
+
+    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    rows = re.findall(
+        r"^\| `(\w+)` \|[^|]*\| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE
+    )
+    said = {name: (worlds, iterations) for name, worlds, iterations in rows}
+    made = {name: make() for name, make in PRESETS.items()}
+    assert said == {
+        name: (f"{m.num_envs:,}", f"{m.iterations:,}") for name, m in made.items()
+    }
+
+
+def test_rewards_in_the_environment_guide_are_those_of_the_code():
+    from rewards import CRAWL
+
+    text = (ROOT / "docs" / "environment.md").read_text("utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| [−\d]", text, re.MULTILINE)
+    assert rows == [row.name for row in CRAWL]
