@@ -29,8 +29,8 @@ def make_parser() -> argparse.ArgumentParser:
         prog="fingers",
         description="Teach an anthropomorphic hand to walk on its fingertips.",
         epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 6 an "
-        "installation that cannot work, 75 stopped by a signal after saving (go on with "
-        "--resume).",
+        "installation that cannot work, 75 stopped by a signal after saving (go on "
+        "with --resume).",
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
