@@ -24,14 +24,16 @@ def counting(stream: TextIO, what: str, unit: str) -> Iterator[Count]:
         unit: what is counted, such as "steps".
     """
     show = _Line(stream, what, unit)
-    with Ticker(show.preparing, 1.0) as ticker:
+    try:
+        with Ticker(show.preparing, 1.0) as ticker:
 
-        def count(done: int, total: int) -> None:
-            ticker.stop()
-            show.count(done, total)
+            def count(done: int, total: int) -> None:
+                ticker.stop()
+                show.count(done, total)
 
-        yield count
-    show.end()
+            yield count
+    finally:
+        show.end()
 
 
 class _Line:

@@ -15,11 +15,12 @@ def print_measures(summary: Mapping[str, Any]) -> None:
     for name in ("mean", "95 % interval", "std", "n"):
         table.add_column(name, justify="right")
     for name, measure in summary["measures"].items():
-        interval = f"{_text(measure['low'])} – {_text(measure['high'])}"
+        ends = (_text(measure["low"]), _text(measure["high"]))
+        interval = "–" if measure["low"] is None else f"{ends[0]} – {ends[1]}"
         figures = (_text(measure["mean"]), interval, _text(measure["std"]))
         table.add_row(name, *figures, str(measure["n"]))
     Console(soft_wrap=True, highlight=False).print(table)
 
 
 def _text(value: float | None) -> str:
-    return "undefined" if value is None else f"{value:.4g}"
+    return "–" if value is None else f"{value:.4g}"

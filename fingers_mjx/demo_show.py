@@ -71,7 +71,7 @@ def show(
         screen: where progress goes.
         size: how much of everything.
     """
-    with timed(screen, f"1/5 {source.path} in {size.episodes} randomized episodes"):
+    with timed(screen, f"1/5 {source.name} in {size.episodes} randomized episodes"):
         simulated = _evaluate(out, source, screen, size)
     with timed(screen, "2/5 the same episodes in C MuJoCo, through the shim"):
         played = _play(bundle, source, screen, size)

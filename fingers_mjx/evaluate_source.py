@@ -111,7 +111,7 @@ def document(
     about = summary_document(
         table.columns,
         source.setup.train.task,
-        str(source.path),
+        source.name,
         seed,
         source.steps_trained,
         commit_here(),

@@ -40,6 +40,12 @@ class PolicySource:
     network: Network
     steps_trained: int
 
+    @property
+    def name(self) -> str:
+        """The end of the path: what is written tells nothing of where it lies."""
+        path = self.path.absolute()
+        return f"{path.parent.name}/{path.name}" if path.suffix else path.name
+
 
 def load_source(path: Path) -> PolicySource:
     """Reads a policy from wherever training or export has put it.

@@ -89,7 +89,8 @@ def test_resume_goes_on_and_may_go_further(run_dir, capsys):
 
 def test_evaluation_of_a_run_is_kept_with_it(bundle_dir, run_dir):
     summary = json.loads((run_dir / "eval/summary.json").read_text())
-    assert (summary["task"], summary["episodes"], summary["seed"]) == ("crawl", 3, 0)
+    found = [summary[name] for name in ("task", "policy", "episodes", "seed")]
+    assert found == ["crawl", "run", 3, 0]  # and not the way to it
     assert summary["steps_trained"] == load_source(run_dir).steps_trained
     assert set(summary["measures"]) >= MEASURES
     for measure in summary["measures"].values():
