@@ -42,8 +42,8 @@ class ConsoleLink:
             word = data.decode("ascii", "replace")
             if word == "quit":
                 self.quitting, action = True, Operator.STOP
-            elif word.startswith("policy "):
-                self.selected = int(word.removeprefix("policy "))
+            elif word.startswith("policy ") and word[7:].isdigit():
+                self.selected = int(word[7:])
             else:
                 action = ACTIONS.get(word, action)
 

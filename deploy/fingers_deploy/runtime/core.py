@@ -80,7 +80,7 @@ class Core:
         self._interface, self._now = interface, now
         self._limits, self._policy = limits, 0
         self._per_control = steps_per_control
-        self._start_s = now()
+        self._start_s = self._last_s = now()
         self.state = initial_state(limits[0], self._start_s, wiggle)
         self.stats = LoopStats()
         self.checks: tuple[Check, ...] = ()
@@ -104,6 +104,8 @@ class Core:
             operator: what the operator asked since the step before.
         """
         t = tick.t_s
+        self.stats.gap.add(t - self._last_s)
+        self._last_s = t
         control, skipped = self._control(tick)
         reading, imu, health, error = self._read()
         answer = self._poll(t)

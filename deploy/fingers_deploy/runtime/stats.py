@@ -2,7 +2,7 @@
 
 import numpy as np
 
-LATE_S = 0.005
+LATE_S, GAP_S = 0.005, 0.004
 _BIN_S = 1e-4
 _BINS = 1000  # up to 100 ms; the last bin takes what is longer
 _WINDOW = 500  # control steps of the rate that is warned about: 10 s
@@ -43,14 +43,16 @@ class LoopStats:
     """Timing of the control steps.
 
     Attributes:
-        late: start of a step after its deadline.
-        work: duration of a step.
+        late: start of a control step after its deadline.
+        gap: time from one step of the loop to the next, control step or not.
+        work: duration of a step of the loop.
         answer: observation sent to proposal received.
         skipped: control steps that were given up.
     """
 
     def __init__(self) -> None:
-        self.late, self.work, self.answer = Timing(), Timing(), Timing()
+        self.late, self.gap = Timing(), Timing()
+        self.work, self.answer = Timing(), Timing()
         self.skipped = 0
         self._recent = np.zeros(_WINDOW, bool)
         self._steps = 0
@@ -78,6 +80,9 @@ class LoopStats:
             "late_p99_ms": 1e3 * late.quantile(0.99),
             "late_p999_ms": 1e3 * late.quantile(0.999),
             "late_max_ms": 1e3 * late.worst_s,
+            "loop_steps": self.gap.count,
+            "gaps_over_4ms": self.gap.above(GAP_S),
+            "gap_max_ms": 1e3 * self.gap.worst_s,
             "work_p50_ms": 1e3 * self.work.quantile(0.5),
             "work_max_ms": 1e3 * self.work.worst_s,
             "answer_p50_ms": 1e3 * self.answer.quantile(0.5),
