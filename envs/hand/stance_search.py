@@ -4,7 +4,7 @@ Minimized is a sum of squared preferences over palm pitch, roll, height and 20 j
 angles, subject to the five tip centres one tip radius above the floor. The paper does
 not give its stance; every preference and weight here is our choice. Run by
 `fingers hand stance`; same seed, same result. The stored stance is that of the default
-hand file, seed 0 and 16 starts.
+hand file, seed 0 and 40 starts.
 """
 
 from dataclasses import dataclass
@@ -65,7 +65,7 @@ class StanceWeights:
 def search_stance(
     hand: HandFile,
     seed: int = 0,
-    starts: int = 16,
+    starts: int = 40,
     weights: StanceWeights | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Finds the best of several local optima (SLSQP) from random starts.
