@@ -8,6 +8,7 @@
 import argparse
 import json
 import multiprocessing
+import os
 import sys
 import tempfile
 import time
@@ -30,6 +31,12 @@ def _busy() -> None:
         block[:] = bytes(len(block))
 
 
+def stolen_s() -> float:
+    """Time that a hypervisor took from this machine's processors so far [s]."""
+    steal = int(Path("/proc/stat").read_text().split()[8])
+    return steal / os.sysconf("SC_CLK_TCK")
+
+
 def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     """Runs for some time; returns the timing that the run itself recorded."""
     interface = load_bundle(bundle).manifest.interface
@@ -40,12 +47,13 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     ):
         options = plain_options(bundle, simulator.path, out, realtime=realtime)
         launcher = Launcher(options, lines.append)
-        end, armed = time.monotonic() + seconds, 0
+        end, stolen = time.monotonic() + seconds, stolen_s()
         while time.monotonic() < end and launcher.poll(0.2):
             mode = launcher.status.get("mode")
             if mode == "disabled":
-                armed += 1
                 launcher.send("arm")
+            elif mode == "stopping":
+                launcher.send("stop")
             elif mode == "safe":
                 launcher.send("clear")
         launcher.send("quit")
@@ -56,6 +64,7 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     trips = [line for line in lines if line.startswith("active -> ")]
     active = sum(int((part["mode"] == 2).sum()) for part in rows)
     return {
+        "stolen_s": round(stolen_s() - stolen, 2),
         "scheduler": launcher.status["realtime"],
         **launcher.status["timing"],
         "steps_with_policy": active,
