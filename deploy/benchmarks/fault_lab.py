@@ -154,6 +154,7 @@ class Lab:
         loop_hz: rate of the supervisor's loop.
         wiggle: joints that arming wiggles.
         seed: of the sensor noise.
+        limits: fields of the supervisor's limits to set.
     """
 
     def __init__(
@@ -164,6 +165,7 @@ class Lab:
         loop_hz: float = 500.0,
         wiggle: tuple[int, ...] = (),
         seed: int = 0,
+        **limits: float,
     ):
         interface = bundles[0].manifest.interface
         chain = interface.command_path
@@ -180,12 +182,14 @@ class Lab:
         controllers = tuple(PolicyController(b, "numpy") for b in bundles)
         self.source = FixedCommand(sticks)
         self.link = LabLink(Policies(controllers, self.source), self.clock)
-        limits = tuple(make_limits(b.manifest, hand.joint_limits_rad) for b in bundles)
+        each = tuple(
+            make_limits(b.manifest, hand.joint_limits_rad, **limits) for b in bundles
+        )
         per_control = round(loop_hz / interface.control_rate_hz)
         self.core = Core(
             self.driver,
             self.link,
-            limits,
+            each,
             interface,
             per_control,
             self.clock,

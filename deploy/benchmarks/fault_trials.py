@@ -9,6 +9,8 @@ from fault_scenarios import Scenario
 
 from fingers_deploy.safety import Mode
 
+WATCHED_S = 0.3
+
 
 @dataclass(frozen=True)
 class Trial:
@@ -42,11 +44,17 @@ def run_trial(start: Lab, scenario: Scenario, seed: int) -> Trial:
         t0 = lab.clock.t
         begun = scenario.install(lab, rng)
         t0 = t0 if begun is None else begun
-        while abs(lab.clock.t - t0) < scenario.ends_s:
+        while abs(lab.clock.t - t0) < scenario.ends_s and not _over(lab):
             lab.tick()
     except Exception as error:
         return Trial(np.inf, lab.mode, "", np.inf, -1, False, repr(error))
     return _judge(lab, t0)
+
+
+def _over(lab: Lab) -> bool:
+    """Power has been off for long enough to see that nothing is sent any more."""
+    when, mode = lab.modes[-1] if lab.modes else (0.0, Mode.ACTIVE)
+    return mode == Mode.SAFE and lab.clock.t - when > WATCHED_S
 
 
 def _judge(lab: Lab, t0: float) -> Trial:

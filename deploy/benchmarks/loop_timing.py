@@ -47,9 +47,11 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     ):
         options = plain_options(bundle, simulator.path, out, realtime=realtime)
         launcher = Launcher(options, lines.append)
+        memory: list[float] = []
         end, stolen = time.monotonic() + seconds, stolen_s()
         while time.monotonic() < end and launcher.poll(0.2):
             mode = launcher.status.get("mode")
+            memory.append(launcher.status.get("memory_mb", 0.0))
             if mode == "disabled":
                 launcher.send("arm")
             elif mode == "stopping":
@@ -67,6 +69,7 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         "stolen_s": round(stolen_s() - stolen, 2),
         "scheduler": launcher.status["realtime"],
         **launcher.status["timing"],
+        "memory_mb": [round(memory[len(memory) // 10], 2), round(memory[-1], 2)],
         "steps_with_policy": active,
         "stops": max(len(trips) - 1, 0),
         "why": sorted({line.split(":")[0] for line in lines if " -> hold" in line}),

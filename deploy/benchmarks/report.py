@@ -25,6 +25,7 @@ LOOP = (
     "gap_max_ms",
     "answer_p999_ms",
     "stolen_s",
+    "memory_mb",
     "stops",
     "why",
 )
@@ -69,8 +70,8 @@ def page(step: list, loop: list, size: list, fuzz: dict) -> str:
         "## The loop in real time, against a simulated hand in another process",
         "Wanted: at most 0.1 % of the control steps more than 5 ms late; without "
         "real-time priority it may miss, but must say so and hold. A stop is the "
-        "supervisor's; its reasons are beside it. `stolen_s` is the time that the host "
-        "of this virtual machine took away from it, against which nothing inside helps.",
+        "supervisor's; its reasons are beside it. `stolen_s` is the time that the "
+        "host of this virtual machine took from it: nothing inside helps against that.",
         table(loop, LOOP),
         "## Installed size and import",
         "Wanted: at most 40 MB with NumPy alone, 120 MB with ONNX Runtime (10⁶ bytes, "

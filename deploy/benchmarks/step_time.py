@@ -9,10 +9,8 @@ import argparse
 import gc
 import json
 import os
-import resource
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 from hand_files import marching_bundle
@@ -22,6 +20,7 @@ from fingers_deploy.controller import PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_deploy.reading import Health, ImuReading, Reading
 from fingers_deploy.rotations import conjugate, gravity
+from fingers_deploy.runtime.realtime import resident_mb
 from fingers_deploy.safety import (
     Inputs,
     Mode,
@@ -34,12 +33,6 @@ from fingers_deploy.safety import (
 from fingers_deploy.safety.detect_policy import complement
 
 WARM_UP = 2000
-
-
-def resident_bytes() -> int:
-    """Memory of this process that is in RAM."""
-    pages = int(Path("/proc/self/statm").read_text().split()[1])
-    return pages * resource.getpagesize()
 
 
 def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
@@ -83,7 +76,7 @@ def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
         if k >= 0:
             took[k] = time.perf_counter() - begin
         if k >= 0 and k % 1000 == 0:
-            memory.append(resident_bytes())
+            memory.append(resident_mb())
     assert state.mode == Mode.ACTIVE, state.faults
     median, high = np.quantile(took, (0.5, 0.999))
     return {
@@ -92,8 +85,8 @@ def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
         "median_ms": round(1e3 * float(median), 4),
         "p999_ms": round(1e3 * float(high), 4),
         "worst_ms": round(1e3 * float(took.max()), 3),
-        "memory_growth_mb": round((max(memory) - memory[0]) / 2**20, 3),
-        "memory_mb": round(memory[-1] / 2**20, 1),
+        "memory_growth_mb": round(max(memory) - memory[0], 3),
+        "memory_mb": round(memory[-1], 1),
     }
 
 

@@ -16,7 +16,7 @@ from fingers_deploy.record.recorder import Recorder
 from fingers_deploy.runtime.console import ConsoleLink
 from fingers_deploy.runtime.core import Core
 from fingers_deploy.runtime.link import SupervisorEnd
-from fingers_deploy.runtime.realtime import prefer_this_process
+from fingers_deploy.runtime.realtime import prefer_this_process, resident_mb
 from fingers_deploy.runtime.signals import ignore_interrupts
 from fingers_deploy.runtime.ticker import Ticker
 from fingers_deploy.safety.limits import Limits, make_limits
@@ -142,6 +142,7 @@ class Supervisor:
             "realtime": realtime,
             "timing_warning": core.stats.warning,
             "timing": core.stats.summary(),
+            "memory_mb": resident_mb(),
             "checks": [[c.name, c.passed, c.found] for c in core.checks],
             "over": core.over,
             "recording": "" if recorder is None else str(recorder.files[-1]),

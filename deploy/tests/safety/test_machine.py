@@ -140,7 +140,7 @@ def test_the_transition_table_never_arms_by_itself(pair):
 FAULTS = [None, *BOOLEANS]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=80, deadline=None)
 @given(
     script=st.lists(
         st.tuples(
