@@ -59,7 +59,7 @@ class CrawlConfig:
     episode_s: float = field(default=20.0, metadata={"unit": "s", "low": 0.1})
     control_dt_s: float = field(default=0.02, metadata={"unit": "s", "low": 0.005})
     action_scale_rad: float = field(default=0.060, metadata={"unit": "rad", "low": 0.0})
-    action_clip: float = field(default=1.0, metadata={"unit": "1", "low": 0.1})
+    action_clip: float = field(default=1.5, metadata={"unit": "1", "low": 0.1})
     max_roll_deg: float = field(default=35.0, metadata={"unit": "deg", "low": 1.0})
     max_pitch_deg: float = field(default=30.0, metadata={"unit": "deg", "low": 1.0})
     reset_joint_rad: float = field(default=0.05, metadata={"unit": "rad", "low": 0.0})

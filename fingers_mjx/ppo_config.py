@@ -114,7 +114,7 @@ def fast() -> TrainConfig:
     Less noise at the start lets the hand stand before the lift reward drives it, and
     more, smaller iterations learn faster than fewer with twice the worlds.
     """
-    ppo = PpoConfig(init_noise_std=0.5)
+    ppo = PpoConfig(init_noise_std=0.5, entropy_cost=0.003)
     return TrainConfig(preset="fast", num_envs=4096, iterations=3000, ppo=ppo)
 
 
