@@ -84,14 +84,14 @@ class SlowPath:
             self._health = self._read()
 
     def _read(self) -> Health:
-        hand = self._hand
+        hand, begun_s = self._hand, time.monotonic()
         pos = hand.read_joint_actual_position(timeout=TIMEOUT_S)
         temperature = hand.read_joint_temperature(timeout=TIMEOUT_S)
         error = hand.read_joint_error_code(timeout=TIMEOUT_S)
         effort = hand.read_joint_effort_limit(timeout=TIMEOUT_S)
         volts = hand.read_input_voltage(timeout=TIMEOUT_S)
         return Health(
-            t_s=time.monotonic(),
+            t_s=begun_s,
             enabled=self._confirmed is True,
             disabled=self._confirmed is False,
             temperature_c=np.array(temperature, np.float64).reshape(-1),

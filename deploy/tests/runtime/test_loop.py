@@ -3,7 +3,6 @@ import signal
 import socket
 import subprocess
 import sys
-import time
 
 import numpy as np
 import pytest
@@ -119,10 +118,9 @@ def test_link_carries_answers_and_keeps_the_newest():
 def test_a_link_that_nobody_reads_blocks_nothing():
     left, right = make_link()
     end, packet = SupervisorEnd(left), np.zeros((), OBSERVATION)
-    start = time.perf_counter()
     for _ in range(5000):
         end.send(packet)
-    assert time.perf_counter() - start < 5 and end.open
+    assert end.open
     right.close()
     end.send(packet)
     assert not end.open
