@@ -173,7 +173,9 @@ def _play(commands) -> None:
     parser.add_argument(
         "bundle", metavar="BUNDLE", type=Path, help="bundle directory or policy.onnx"
     )
-    parser.add_argument("--video", type=Path, metavar="FILE", help="mp4 to write")
+    parser.add_argument(
+        "--video", type=Path, metavar="FILE", help=".mp4, .webp or .gif to write"
+    )
     parser.add_argument(
         "--seconds", type=number(0.1), default=20.0, help="length (default 20)"
     )

@@ -5,22 +5,23 @@ import dataclasses
 import sys
 from typing import Any
 
-from envs.errors import InputError
+from envs.errors import InputError, one_of
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import document, nominal, with_command
 from fingers_mjx.play import Player
 from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
-from fingers_mjx.play_video import write_video
+from fingers_mjx.play_video import VIDEO_SUFFIXES, write_video
 from fingers_mjx.policy_source import PolicySource, load_bundle_setup
 from fingers_mjx.run_setup import Setup, make_env
 
 
 def run(args: argparse.Namespace) -> int:
     """Plays; the table goes to stdout, progress to stderr."""
-    if args.video and args.video.suffix != ".mp4":
-        raise InputError("--video", "suffix", args.video.suffix, ".mp4")
+    if args.video and args.video.suffix not in VIDEO_SUFFIXES:
+        valid = one_of(VIDEO_SUFFIXES)
+        raise InputError("--video", "suffix", args.video.suffix, valid)
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
     player = Player(make_env(setup, 1, "cpu"), bundle, args.runtime)

@@ -11,8 +11,9 @@ from fingers_mjx.play import Played
 from fingers_mjx.raycast_camera import Camera
 from fingers_mjx.raycast_overlay import caption
 from fingers_mjx.raycast_shade import Look
-from fingers_mjx.video import Frame, follow, frames, write_mp4
+from fingers_mjx.video import Frame, follow, frames, write_animation, write_mp4
 
+VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16
 LOOK = Look(sky_samples=0)
 
@@ -26,10 +27,10 @@ def write_video(
     width: int,
     progress: Callable[[int, int], None],
 ) -> Path:
-    """Writes an mp4 of an episode.
+    """Writes a film of an episode.
 
     Args:
-        path: file to write.
+        path: file to write, with one of `VIDEO_SUFFIXES`.
         model: the scene.
         played: the episode.
         dt_s: control interval.
@@ -43,7 +44,8 @@ def write_video(
     size = (width, 2 * round(width * ASPECT / 2))
     pictures = frames(model, qpos, cameras, size, LOOK)
     texts = [_text(played, step, dt_s) for step in steps]
-    return write_mp4(path, _captioned(pictures, texts, progress), fps)
+    write = write_mp4 if path.suffix == ".mp4" else write_animation
+    return write(path, _captioned(pictures, texts, progress), fps)
 
 
 def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
