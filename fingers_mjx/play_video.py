@@ -10,12 +10,12 @@ from jaxtyping import Float
 from fingers_mjx.play import Played
 from fingers_mjx.raycast_camera import Camera
 from fingers_mjx.raycast_overlay import caption
-from fingers_mjx.raycast_shade import Look
 from fingers_mjx.video import Frame, follow, frames, write_animation, write_mp4
 
 VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16
-LOOK = Look(sky_samples=0)
+AHEAD_M = 0.06
+"""From the palm's origin to the middle of the hand."""
 
 
 def write_video(
@@ -42,7 +42,7 @@ def write_video(
     qpos = played.qpos[steps]
     cameras = follow(_view(qpos[0]), qpos[:, :3], fps)
     size = (width, 2 * round(width * ASPECT / 2))
-    pictures = frames(model, qpos, cameras, size, LOOK)
+    pictures = frames(model, qpos, cameras, size)
     texts = [_text(played, step, dt_s) for step in steps]
     write = write_mp4 if path.suffix == ".mp4" else write_animation
     return write(path, _captioned(pictures, texts, progress), fps)
@@ -59,12 +59,13 @@ def _view(qpos: Float[np.ndarray, " nq"]) -> Camera:
     """Returns a view from the front left of where the hand points."""
     w, x, y, z = qpos[3:7]
     # The fingers point along the palm's z.
-    heading = np.degrees(np.arctan2(2 * (y * z - w * x), 2 * (x * z + w * y)))
+    heading = np.arctan2(2 * (y * z - w * x), 2 * (x * z + w * y))
+    ahead = AHEAD_M * np.array([np.cos(heading), np.sin(heading)])
     return Camera(
-        lookat_w=(0.0, 0.0, 0.065),
-        distance_m=0.52,
-        azimuth_deg=float(heading) + 230.0,
-        elevation_deg=-20.0,
+        lookat_w=(float(ahead[0]), float(ahead[1]), 0.06),
+        distance_m=0.45,
+        azimuth_deg=float(np.degrees(heading)) + 248.0,
+        elevation_deg=-18.0,
     )
 
 
