@@ -1,4 +1,4 @@
-"""What the shim takes on a disk, and how long it takes to import.
+"""What the shim takes on a disk, and how long it takes to import (processor time).
 
     python deploy/benchmarks/install_size.py
 
@@ -6,18 +6,20 @@ builds the wheel and installs it into fresh environments, without and with ONNX 
 """
 
 import json
+import platform
 import shutil
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+ROBOT = "aarch64-manylinux_2_28"
 DEPLOY = Path(__file__).parents[1]
 _IMPORT = """
 import time
-start = time.perf_counter()
+start = time.process_time()
 import fingers_deploy
-print(time.perf_counter() - start)
+print(time.process_time() - start)
 """
 
 
@@ -40,9 +42,27 @@ def measure(wheel: Path, extra: str, folder: Path) -> dict:
     python = folder / "bin" / "python"
     _run("uv", "pip", "install", "-q", "--python", python, f"{wheel}{extra}")
     site = next((folder / "lib").glob("python*")) / "site-packages"
-    sizes = {entry.name: size_mb(entry) for entry in site.iterdir() if entry.is_dir()}
     _run(python, "-c", _IMPORT)
     times = sorted(float(_run(python, "-c", _IMPORT)) for _ in range(5))
+    return {
+        "machine": platform.machine(),
+        **_sizes(site, extra),
+        "import_s": round(times[2], 3),
+    }
+
+
+def measure_robot(wheel: Path, extra: str, folder: Path) -> dict:
+    """The same for the robot's computer, whose wheels are only unpacked here."""
+    _run(
+        *("uv", "pip", "install", "-q", "--python", sys.executable),
+        *("--target", folder, "--python-platform", ROBOT, "--only-binary", ":all:"),
+        f"{wheel}{extra}",
+    )
+    return {"machine": ROBOT.partition("-")[0], **_sizes(folder, extra)}
+
+
+def _sizes(site: Path, extra: str) -> dict:
+    sizes = {entry.name: size_mb(entry) for entry in site.iterdir() if entry.is_dir()}
     # What no policy needs: tests, and libraries to link other programs with.
     spare = [f for d in site.rglob("tests") if d.is_dir() for f in d.rglob("*")]
     spare += [*site.rglob("*.a"), *site.rglob("*.pyi")]
@@ -54,7 +74,6 @@ def measure(wheel: Path, extra: str, folder: Path) -> dict:
         "installed_mb": size_mb(site),
         "largest_mb": dict(sorted(sizes.items(), key=lambda x: -x[1])[:6]),
         "fingers_deploy_mb": sizes["fingers_deploy"],
-        "import_s": times[2],
     }
 
 
@@ -70,6 +89,9 @@ def main() -> int:
         results = [
             measure(wheel, extra, base / f"venv{i}")
             for i, extra in enumerate(("", "[onnx]"))
+        ] + [
+            measure_robot(wheel, extra, base / f"robot{i}")
+            for i, extra in enumerate(("", "[onnx]", "[onnx,hand]"))
         ]
     print(json.dumps(results, indent=1))
     return 0

@@ -1,5 +1,7 @@
 """The fault matrix, small; `make test-slow` runs the large one."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from fault_lab import Lab, snapshots
@@ -9,6 +11,8 @@ from fault_scenarios import SCENARIOS
 from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
 
+import fingers_mjx
+from fingers_deploy import load_bundle
 from fingers_deploy.safety import ROWS, Mode
 
 SEED = 500
@@ -94,6 +98,16 @@ def test_no_false_stop(starts):
     assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
     heights = lab.driver.hand.data.qpos[2]
     assert np.isfinite(heights) and heights > 0.1
+
+
+def test_the_trained_policy_walks_under_the_supervisor(hand_model):
+    policy = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
+    bundle = load_bundle(policy)
+    lab = Lab(hand_model, (bundle,), sticks=(1.0, 0.0, 0.0), loop_hz=250).activate()
+    begin = lab.driver.hand.data.qpos[:2].copy()
+    lab.run(8.0)
+    assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
+    assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
 
 
 @pytest.mark.slow
