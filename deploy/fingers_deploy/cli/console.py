@@ -1,5 +1,6 @@
 """The operator's console: typed actions in, plain lines out."""
 
+import os
 import select
 import signal
 import sys
@@ -30,7 +31,11 @@ def drive(options: Mapping[str, Any], arm: bool, duration_s: float | None) -> in
 
 
 def _say(line: str) -> None:
-    print(line, flush=True)
+    """Prints a line; a terminal that is gone must not end the watch over the hand."""
+    try:
+        print(line, flush=True)
+    except OSError:
+        sys.stdout = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115
 
 
 class Console:

@@ -142,6 +142,22 @@ def test_the_policy_of_another_hand_order_is_refused_by_the_supervisor(
     assert "Traceback" not in done.stderr
 
 
+def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
+    program = [sys.executable, "-m", "fingers_deploy", "run", str(marching_dir)]
+    program += ["--driver", "sim", "--model", str(hand_model), "--no-record"]
+    process = subprocess.Popen(
+        [*program, "--duration", "2"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        stdin=subprocess.DEVNULL,
+        text=True,
+    )
+    process.stdout.close()
+    assert process.wait(timeout=60) == 0
+    assert process.stderr.read() == ""
+    process.stderr.close()
+
+
 def test_help_says_what_there_is():
     said = _run("--help").stdout
     for word in ("check", "run", "record", "guard", "log"):
