@@ -58,6 +58,12 @@ def make_networks(
         distribution_type="normal",
         noise_std_type=config.noise_std_type,  # pyright: ignore[reportArgumentType]
         init_noise_std=config.init_noise_std,
+        mean_kernel_init_fn=jax.nn.initializers.variance_scaling,
+        mean_kernel_init_kwargs={
+            "scale": config.init_mean_scale**2,
+            "mode": "fan_in",
+            "distribution": "uniform",
+        },
     )
 
 

@@ -39,6 +39,9 @@ class PpoConfig:
         actor_layers: hidden sizes of the policy.
         critic_layers: hidden sizes of the value function.
         init_noise_std: standard deviation of the action noise at the start (ours).
+        init_mean_scale: factor on the weights of the policy's last layer at the start
+            (ours). Actions move targets on, so that outputs of usual size throw the
+            hand over within a second; with small ones it stands, and learns from there.
         noise_std_type: "log" learns log σ, which cannot turn negative; "scalar" σ.
         reward_scale: factor on the reward that the learner sees (ours).
         max_bad_updates: consecutive updates skipped as non-finite that stop the run.
@@ -60,6 +63,7 @@ class PpoConfig:
     actor_layers: tuple[int, ...] = _number((512, 256, 128), 1)
     critic_layers: tuple[int, ...] = _number((512, 256, 128), 1)
     init_noise_std: float = _number(1.0, POSITIVE)
+    init_mean_scale: float = _number(1.0, POSITIVE)
     noise_std_type: Literal["log", "scalar"] = "log"
     reward_scale: float = _number(1.0, POSITIVE)
     max_bad_updates: int = _number(4, 1)

@@ -1,5 +1,6 @@
 """PPO on probe environments whose answers are known, and its compiled form."""
 
+import dataclasses
 import functools
 import hashlib
 import importlib.util
@@ -10,9 +11,11 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from brax.training.agents.ppo import networks
 from probe_envs import Fault, probe
 
 from fingers_mjx.ppo import compile_iterations, make_iteration
+from fingers_mjx.ppo_brax import make_networks
 from fingers_mjx.ppo_config import PpoConfig
 from fingers_mjx.ppo_state import init_train_state, make_learner, strong
 from fingers_mjx.ppo_totals import means
@@ -184,3 +187,29 @@ def test_world_reported_invalid_does_not_teach():
     assert totals["invalid"][0] == 60 * 8
     np.testing.assert_allclose(value_of(train, [0.0]), 1.0, atol=0.05)
     assert totals["reward/probe"][1] == 60 * 8 * 63
+
+
+def test_the_last_layer_of_the_policy_starts_as_small_as_asked():
+    """With factor 1 it is the usual start; nothing else changes with it."""
+    sizes = {"state": 6, "privileged_state": 7}
+    usual = networks.make_ppo_networks(
+        sizes,
+        2,
+        policy_hidden_layer_sizes=(5,),
+        distribution_type="normal",
+        noise_std_type="log",
+        policy_obs_key="state",
+        value_obs_key="privileged_state",
+    ).policy_network.init(jax.random.key(0))
+    config = dataclasses.replace(SMALL, actor_layers=(5,), init_noise_std=1.0)
+    found = [
+        make_networks(sizes, 2, dataclasses.replace(config, init_mean_scale=scale))
+        for scale in (1.0, 0.1)
+    ]
+    one, tenth = (n.policy_network.init(jax.random.key(0)) for n in found)
+    jax.tree.map(np.testing.assert_array_equal, one, usual)
+    kernel = one["params"]["Dense_0"].pop("kernel")
+    np.testing.assert_allclose(
+        tenth["params"]["Dense_0"].pop("kernel"), 0.1 * kernel, rtol=1e-5
+    )
+    jax.tree.map(np.testing.assert_array_equal, one, tenth)
