@@ -153,18 +153,17 @@ def _toppled(lab: Lab, rng: Rng) -> None:
 
 
 def _blocked(lab: Lab, rng: Rng) -> None:
-    """A finger is caught: a joint stays where it is while its target runs away."""
+    """A finger is caught: a joint stays 0.3 rad off its target, where 0.25 may be."""
     joint = int(rng.integers(20))
     lab.core._limits = tuple(
-        replace(x, tracking_rad=0.05, stall_s=np.inf, over_effort_s=np.inf)
+        replace(x, tracking_rad=0.25, stall_s=np.inf, over_effort_s=np.inf)
         for x in lab.core._limits
     )
-    start = lab.driver.hand.state()["pos"][joint]
-    side = 1.0 if start < lab.core.limits.allowed_rad[joint].mean() else -1.0
 
     def change(sample, rng, t0, t):
-        pos = sample.pos_rad.copy()
-        pos[joint] = start + side * 0.4 + 1e-5 * rng.normal()
+        pos, target = sample.pos_rad.copy(), lab.core.state.target_rad[joint]
+        middle = lab.core.limits.allowed_rad[joint].mean()
+        pos[joint] = target + (0.3 if target < middle else -0.3) + 1e-5 * rng.normal()
         return replace(sample, pos_rad=pos)
 
     _samples(Reading, change)(lab, rng)
