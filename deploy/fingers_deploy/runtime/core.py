@@ -155,7 +155,10 @@ class Core:
     def _poll(self, t: float) -> Answer | None:
         answer = self._link.poll()
         if answer is not None:
-            if 0 <= answer.policy < len(self._limits):
+            # The policy process may say which of the two it runs, not choose another.
+            if answer.policy in (0, self.selected) and self.selected < len(
+                self._limits
+            ):
                 self._policy = answer.policy
             self._command = answer.command
             sent = self._sent.pop(answer.proposal.tick, None)

@@ -2,11 +2,13 @@
 
 import ast
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from fault_lab import Lab
+from hand_files import marching_bundle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -71,6 +73,20 @@ def test_targets_are_those_of_the_policy_alone(walk, marching):
             before["pos"], before["gravity"], before["gyro"], after["command"][:3]
         )
         np.testing.assert_allclose(target, after["cmd"], atol=2e-4)
+
+
+def test_a_policy_process_cannot_choose_milder_limits(hand_model, marching):
+    lab = Lab(hand_model, (marching, marching_bundle("recovery")), loop_hz=250)
+    lab.activate()
+    recovering = lab.core._limits[1]
+    assert recovering.tilt_s == 10.0 and lab.core.limits.tilt_s == 0.1
+    poll = lab.link.poll
+    lab.link.poll = lambda: (a := poll()) and replace(a, policy=1)
+    lab.run(0.1)
+    assert lab.core.limits.tilt_s == 0.1
+    lab.core.selected = 1  # by the operator
+    lab.run(0.1)
+    assert lab.core.limits is recovering
 
 
 def test_jumps_of_the_wall_clock_change_nothing(hand_model, marching, monkeypatch):
