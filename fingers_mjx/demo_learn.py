@@ -3,17 +3,18 @@
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import jax
 
 from envs.batch import BatchEnv
+from fingers_mjx.demo_explore import explore
 from fingers_mjx.demo_screen import Screen, timed
 from fingers_mjx.evaluate import EpisodeTable
-from fingers_mjx.evaluate_source import evaluate_source
 from fingers_mjx.export import ExportReport, brax_weights
 from fingers_mjx.export_run import export_run
-from fingers_mjx.policy_source import PolicySource, load_source
 from fingers_mjx.ppo_config import TrainConfig, preset
+from fingers_mjx.ppo_policy import Network, load_policy
 from fingers_mjx.ppo_state import init_train_state, make_learner
 from fingers_mjx.run_setup import Setup, identity, make_env, new_setup
 from fingers_mjx.train import train
@@ -43,7 +44,7 @@ class Learned:
     Attributes:
         run_dir: of the run.
         before, after: the same randomized worlds under the untrained policy and the
-            one of the last checkpoint.
+            one of the last checkpoint, both with their exploration noise.
         trained_s: time of training, with compilation [s].
         export: how far the exported policy is from JAX.
     """
@@ -76,19 +77,20 @@ def learn(out: Path, screen: Screen, size: LearnSize) -> Learned:
         _train(run_dir, setup, env, screen)
     trained_s = time.monotonic() - start_s
     with timed(screen, "5/5 what it has learned, and its export"):
-        before = _measure(untrained(run_dir, setup, env), screen, size)
-        after = _measure(load_source(run_dir), screen, size)
+        trained = load_policy(run_dir)
+        first, noise = untrained(setup, env), setup.train.ppo.init_noise_std
+        before = _measure(setup, first, noise, screen, size)
+        after = _measure(setup, trained, trained.noise_std, screen, size)
         report = export_run(run_dir, run_dir)
     return Learned(run_dir, before, after, trained_s, report)
 
 
-def untrained(path: Path, setup: Setup, env: BatchEnv) -> PolicySource:
+def untrained(setup: Setup, env: BatchEnv) -> Network:
     """Returns the policy that a run starts from, up to its random numbers."""
     learner = make_learner(env, setup.train.ppo)
     state = init_train_state(learner, env, jax.random.key(setup.train.seed))
     clip = setup.env.action_clip
-    weights = brax_weights(state.params.policy, state.normalizer, clip)
-    return PolicySource(path, setup, weights, 0)
+    return brax_weights(state.params.policy, state.normalizer, clip)
 
 
 def _train(run_dir: Path, setup: Setup, env: BatchEnv, screen: Screen) -> None:
@@ -104,8 +106,9 @@ def _train(run_dir: Path, setup: Setup, env: BatchEnv, screen: Screen) -> None:
         )
 
 
-def _measure(source: PolicySource, screen: Screen, size: LearnSize) -> EpisodeTable:
+def _measure(
+    setup: Setup, network: Network, noise_std: Any, screen: Screen, size: LearnSize
+) -> EpisodeTable:
+    env = make_env(setup, size.episodes, "cpu", auto_reset=False)
     with screen.counting("evaluating", "steps") as count:
-        return evaluate_source(
-            source, size.episodes, SEED, steps=size.steps, progress=count
-        )
+        return explore(env, network, noise_std, size.steps, SEED, count)

@@ -126,15 +126,17 @@ def _learning(learned: Learned) -> report.Section:
     text = (
         f"From random networks to this in {steps:,} control steps, "
         f"{learned.trained_s:.0f} s on this machine, compilation included. The hand "
-        "learns to stay on its feet; a gait takes several hundred times as many steps, "
-        "which a GPU makes in minutes."
+        "learns to stay on its feet while it tries out random motions; a gait takes "
+        "some hundred times as many steps, which a GPU makes in minutes."
     )
     header = ("measure", "before", "95 % interval", "after", "95 % interval")
     table = report.Table(header, [_changed(n, learned) for n in LEARNED])
     blocks = [
         report.Note(text),
         report.picture(curves, "Learning curves"),
-        report.picture(standing, "Randomized worlds under the policy of each time"),
+        report.picture(
+            standing, "Randomized worlds, each policy with its exploration noise"
+        ),
         table,
     ]
     return report.Section("Learning on this machine", blocks)

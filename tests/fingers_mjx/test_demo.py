@@ -2,13 +2,18 @@
 
 import re
 from dataclasses import replace
+from types import SimpleNamespace
 
+import jax
+import jax.numpy as jnp
+import numpy as np
 import pytest
 from cli_setup import TRAIN, make_bundle, make_setup
 
 from fingers_mjx.cli import main
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.demo import DemoSize
+from fingers_mjx.demo_explore import Exploring
 from fingers_mjx.demo_learn import LearnSize
 from fingers_mjx.demo_show import ShowSize
 from fingers_mjx.policy_source import load_source
@@ -99,3 +104,28 @@ def test_counting_keeps_few_lines_where_they_are_kept():
     lines = stream.text.splitlines()
     assert len(lines) <= 3
     assert '"done": 100' in lines[-1]
+
+
+class Still:
+    """Two worlds that hand back the action they were given."""
+
+    num_envs, dt = 2, 0.02
+
+    def step(self, state, action):
+        return action
+
+
+def test_exploration_noise_is_each_worlds_own_and_repeatable():
+    keys = jax.random.split(jax.random.key(0), 2)
+
+    def at(step):
+        lasting = SimpleNamespace(key=keys, total_steps=jnp.full(2, step))
+        state = SimpleNamespace(memory=SimpleNamespace(lasting=lasting))
+        return np.asarray(Exploring(Still(), 0.5).step(state, jnp.ones((2, 2000))))
+
+    drawn = at(3)
+    assert np.abs(drawn.mean() - 1.0) < 0.05
+    assert np.abs(drawn.std() - 0.5) < 0.05
+    np.testing.assert_array_equal(drawn, at(3))
+    assert np.abs(np.corrcoef(drawn[0], drawn[1])[0, 1]) < 0.1
+    assert np.abs(np.corrcoef(drawn[0], at(4)[0])[0, 1]) < 0.1

@@ -1,0 +1,79 @@
+"""Evaluation of a policy with its exploration noise: how training itself sees it."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.base import State
+from envs.batch import BatchEnv
+from envs.streams import stream
+from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.ppo_policy import Network, act
+
+
+@dataclass(frozen=True)
+class Exploring:
+    """Worlds that add noise to every action, drawn from each world's own stream.
+
+    Attributes:
+        env: the worlds.
+        noise_std: standard deviation of the noise, one per action or for all.
+    """
+
+    env: BatchEnv
+    noise_std: Any
+
+    @property
+    def dt(self) -> float:
+        """Control interval [s]."""
+        return self.env.dt
+
+    def reset(self, key: Array) -> State:
+        """Starts an episode in every world."""
+        return self.env.reset(key)
+
+    def step(self, state: State, action: Float[Array, "b a"]) -> State:
+        """Advances every world under the action and its noise."""
+        lasting = state.memory.lasting
+        noise = jax.vmap(_noise, (0, 0, None))(
+            lasting.key, lasting.total_steps, action.shape[-1]
+        )
+        return self.env.step(state, action + jnp.asarray(self.noise_std) * noise)
+
+
+def explore(
+    env: BatchEnv,
+    network: Network,
+    noise_std: float | Float[np.ndarray, " a"],
+    steps: int,
+    seed: int,
+    progress: Progress,
+) -> EpisodeTable:
+    """Measures one episode in each world of `env` under a noisy policy.
+
+    Args:
+        env: worlds.
+        network: policy.
+        noise_std: standard deviation of the noise on its actions.
+        steps: longest episode in control steps.
+        seed: of worlds, commands and noise.
+        progress: told (steps done, steps in all).
+    """
+    return evaluate(
+        Exploring(env, noise_std),
+        lambda obs: act(network, obs["state"]),
+        env.num_envs,
+        steps,
+        jax.random.key(seed),
+        float(env.mj_model.body_mass.sum()),
+        progress,
+    )
+
+
+def _noise(key: Array, step: Array, size: int) -> Float[Array, " a"]:
+    key = jax.random.fold_in(stream(key, "exploration"), step)
+    return jax.random.normal(key, (size,))
