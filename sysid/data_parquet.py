@@ -1,0 +1,100 @@
+"""Measured logs as Parquet: one column each, the header in the schema's metadata."""
+
+import json
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from envs.config import from_dict, to_dict
+from envs.errors import InputError
+from sysid.data import LogHeader, MeasuredLog
+
+METADATA_KEY = b"fingers.measured_log"
+MAX_CELLS = 500_000_000
+_VALID = "a Parquet file with numeric columns"
+
+
+def read_parquet(path: Path) -> MeasuredLog:
+    """Reads a log from Parquet.
+
+    Raises:
+        InputError: not such a file.
+        ModuleNotFoundError: pyarrow, of the optional dependencies `data`, is missing.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    try:
+        # `open` keeps to this one file: a path given to pyarrow may name a data set.
+        with open(path, "rb") as stream:
+            file = pyarrow.parquet.ParquetFile(stream)
+            header = _header(path, file.schema_arrow.metadata or {})
+            cells = file.metadata.num_rows * file.metadata.num_columns
+            if not 0 <= cells <= MAX_CELLS:
+                raise InputError(path, "", f"{cells} cells", f"at most {MAX_CELLS}")
+            columns = _columns(path, file.read())
+    except (OSError, pyarrow.ArrowException, UnicodeDecodeError) as error:
+        raise InputError(path, "", error, _VALID) from error
+    if "t" not in columns:
+        raise InputError(path, "columns", ", ".join(columns), "a column t [s]")
+    key, t_s = columns.pop("key", None), columns.pop("t")
+    return MeasuredLog(header, t_s, columns, key, str(path))
+
+
+def write_parquet(log: MeasuredLog, path: Path) -> None:
+    """Writes a log that `read_parquet` reads back exactly; it appears whole or not.
+
+    Raises:
+        ModuleNotFoundError: pyarrow, of the optional dependencies `data`, is missing.
+    """
+    import pyarrow
+    import pyarrow.parquet
+
+    columns: dict[str, Any] = {"t": log.t_s, **log.columns}
+    columns = {k: pyarrow.array(v, mask=np.isnan(v)) for k, v in columns.items()}
+    if log.key is not None:
+        columns["key"] = pyarrow.array(log.key.tolist(), pyarrow.string())
+    header = json.dumps(to_dict(log.header), ensure_ascii=False).encode()
+    table = pyarrow.table(columns).replace_schema_metadata({METADATA_KEY: header})
+    part = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        pyarrow.parquet.write_table(table, part)
+        os.replace(part, path)
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def _header(path: Path, metadata: dict[bytes, bytes]) -> LogHeader:
+    """Reads the header from the metadata of the schema."""
+    field = METADATA_KEY.decode()
+    if METADATA_KEY not in metadata:
+        raise InputError(path, f"metadata {field}", "", "the header of a log as JSON")
+    try:
+        data = json.loads(metadata[METADATA_KEY])
+    except (ValueError, RecursionError) as error:
+        raise InputError(path, f"metadata {field}", error, "JSON") from error
+    return from_dict(LogHeader, data, path)
+
+
+def _columns(path: Path, table: Any) -> dict[str, np.ndarray]:
+    """Returns the columns as arrays: float64, text for `key`."""
+    names = table.column_names
+    if len(set(names)) < len(names):
+        raise InputError(path, "columns", ", ".join(names), "every column once")
+    return {name: _column(path, name, table.column(name)) for name in names}
+
+
+def _column(path: Path, name: str, column: Any) -> np.ndarray:
+    """Returns one column; nulls are missing readings."""
+    from pyarrow import types
+
+    kind = column.type
+    if name == "key":
+        if not (types.is_string(kind) or types.is_large_string(kind)):
+            raise InputError(path, name, kind, "text")
+        return np.asarray([text or "" for text in column.to_pylist()], dtype=str)
+    if not (types.is_floating(kind) or types.is_integer(kind)):
+        raise InputError(path, name, kind, "numbers")
+    return column.cast("float64").to_numpy()

@@ -1,0 +1,1 @@
+"""Public measured data sets as logs; the user downloads them, nothing is included."""
