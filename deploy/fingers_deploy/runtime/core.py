@@ -156,9 +156,7 @@ class Core:
         answer = self._link.poll()
         if answer is not None:
             # The policy process may say which of the two it runs, not choose another.
-            if answer.policy in (0, self.selected) and self.selected < len(
-                self._limits
-            ):
+            if answer.policy in {0, min(self.selected, len(self._limits) - 1)}:
                 self._policy = answer.policy
             self._command = answer.command
             sent = self._sent.pop(answer.proposal.tick, None)
