@@ -101,10 +101,13 @@ class Crawl:
         command = sample_command(key, self.config.command)
         return {"command": command, "lift": init_lift_memory()}
 
-    def start(self, key: Array, plant: Plant) -> PhysicsState:
-        """The stance with noise, at a random heading (ours)."""
-        config = self.config
-        return near_stance(key, plant, config.reset_joint_rad, config.reset_speed_mps)
+    def start(
+        self, key: Array, plant: Plant
+    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+        """The stance with noise, at a random heading (ours), under its targets."""
+        joint_rad, speed_mps = self.config.reset_joint_rad, self.config.reset_speed_mps
+        state = near_stance(key, plant, joint_rad, speed_mps)
+        return state, jnp.array(plant.stance.target_rad)
 
     def inputs(self, carried: Mapping[str, Any]) -> Float[Array, "3"]:
         """The command: v_x, v_y [m/s] and yaw rate [rad/s]."""

@@ -184,8 +184,7 @@ class HandEnv:
     def _start(self, lasting: Lasting) -> State:
         """First state of an episode."""
         key = jax.random.fold_in(stream(lasting.key, "episode"), lasting.episodes)
-        data = self.task.start(key, self.plant)
-        target = jnp.array(self.stance.target_rad)
+        data, target = self.task.start(key, self.plant)
         action, zero = jnp.zeros(self.action_size), jnp.zeros(())
         carried = self.task.begin_episode(key)
         output = self.plant.rest.replace(state=data)

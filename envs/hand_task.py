@@ -87,8 +87,10 @@ class HandTask(Protocol):
         """The task's fields of `Memory` at an episode's start."""
         ...
 
-    def start(self, key: Array, plant: Plant) -> PhysicsState:
-        """First physics state of an episode."""
+    def start(
+        self, key: Array, plant: Plant
+    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+        """First physics state of an episode and the joint targets [rad] held in it."""
         ...
 
     def inputs(self, carried: Mapping[str, Any]) -> Float[Array, " inputs"]:

@@ -1,12 +1,14 @@
 """What an environment carries from step to step besides physics."""
 
+from typing import Any
+
 import flax.struct
 from jaxtyping import Array, Float, Int
 
 from envs.hand.drive import DriveState
 from envs.observations import Sample
 from envs.randomize import Variation
-from rewards import FootprintMemory, LiftMemory, Schedule
+from rewards import Schedule
 
 
 @flax.struct.dataclass
@@ -16,18 +18,18 @@ class Lasting:
     Attributes:
         key: the world's random key.
         variation: the world's draw of the domain randomization.
-        footprint: nominal fingertip targets, captured once.
         weights: reward weights; replace them to sweep rewards without recompiling.
         total_steps: control steps of all episodes, which the curricula follow.
         episodes: episodes begun before this one.
+        footprint: `rewards.FootprintMemory` of tasks that have it, captured once.
     """
 
     key: Array
     variation: Variation
-    footprint: FootprintMemory
     weights: dict[str, Schedule]
     total_steps: Int[Array, "*b"]
     episodes: Int[Array, "*b"]
+    footprint: Any = None
 
 
 @flax.struct.dataclass
@@ -42,7 +44,7 @@ class Memory:
         action: last clipped policy output.
         history: the last eight samples of the observation.
         command: v_x, v_y [m/s] and yaw rate [rad/s] of the coming step.
-        lift: memory of the lift objective.
+        lift: `rewards.LiftMemory` of tasks that have it.
     """
 
     lasting: Lasting
@@ -52,4 +54,4 @@ class Memory:
     action: Float[Array, "*b 20"]
     history: Sample
     command: Float[Array, "*b 3"]
-    lift: LiftMemory
+    lift: Any = None

@@ -50,14 +50,17 @@ from rewards.lift import (
 )
 from rewards.motion import roll_pitch_rate, vertical_velocity
 from rewards.posture import flat_orientation
+from rewards.recovery_table import RECOVERY
 from rewards.schedules import Constant, GeometricDecay, Schedule, StepSwitch
 from rewards.shaping import safe_norm, smoothstep, tracking_kernel
 from rewards.smoothness import action_rate
+from rewards.stance import palm_tilt, stance_height, stance_pose
 from rewards.tables import CRAWL, STOCK
 from rewards.tracking import track_planar_velocity, track_yaw_rate
 
 __all__ = [
     "CRAWL",
+    "RECOVERY",
     "STOCK",
     "AirTimeMemory",
     "AirTimeParams",
@@ -86,10 +89,13 @@ __all__ = [
     "lift_frequency_hz",
     "lift_gate",
     "lift_step",
+    "palm_tilt",
     "precomputed",
     "roll_pitch_rate",
     "safe_norm",
     "smoothstep",
+    "stance_height",
+    "stance_pose",
     "swing_against_command",
     "table_weights",
     "torque",

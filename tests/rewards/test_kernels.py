@@ -81,6 +81,9 @@ KERNELS = {
         tips=True,
     ),
     "flat_orientation": Kernel(rewards.flat_orientation, (VELOCITY,), planar=(0,)),
+    "palm_tilt": Kernel(rewards.palm_tilt, (VELOCITY,), 1.0, planar=(0,)),
+    "stance_height": Kernel(rewards.stance_height, (((), 0.05), ((), 0.05)), 1.0),
+    "stance_pose": Kernel(rewards.stance_pose, (JOINTS, JOINTS, VELOCITY), planar=(2,)),
 }
 
 
@@ -111,7 +114,7 @@ def rotated(x, turn):
 
 
 def test_table_holds_every_kernel_of_the_library():
-    in_tables = {row.kernel for row in rewards.CRAWL + rewards.STOCK}
+    in_tables = {row.kernel for row in rewards.CRAWL + rewards.STOCK + rewards.RECOVERY}
     covered = {k.function for k in KERNELS.values()} | {rewards.precomputed}
     assert in_tables <= covered
     assert set(KERNELS) <= set(rewards.__all__)

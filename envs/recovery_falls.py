@@ -1,0 +1,190 @@
+"""Fallen poses: the hand on its thumb side or its wrist side, fingers curled.
+
+The paper names the two sides, the curled fingers and a random heading; curl and lean
+are drawn here (ours). A pose curls the fingers in free fall, so that they meet each
+other as they would, is laid down on its side and settled under its held targets. What
+rolls off its side or still moves is drawn anew. `recovery_falls.json` beside this
+module is the result for the default hand file.
+"""
+
+import json
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+import mujoco
+import numpy as np
+
+from envs.errors import InputError
+from envs.hand.hand_file import HandFile
+from envs.hand.model import FLOOR, PHYSICS_DT_S, build_model
+from envs.hand.stance import SETTLE_S, Stance
+
+POSES_PER_SIDE = 16
+SIDES = {"thumb": (0.0, 1.0, 0.0), "wrist": (0.0, 0.0, -1.0)}
+"""Direction in the palm frame that points down when the hand lies on that side."""
+
+_SEED = 20260121
+_TRIES = 400
+_CURL_S = 1.5
+_LEAN = 0.35
+_GAP_M = 0.002
+_LEAST_DOWN = {"thumb": 0.85, "wrist": 0.25}
+_SLOWEST = 1e-2
+_FINGER_CURL = ((0.6, -0.1, 0.6, 0.6), (1.3, 0.1, 1.3, 1.3))
+_THUMB_CURL = ((0.3, 0.0, 0.2, 0.2), (1.2, 0.4, 0.9, 0.9))
+
+
+@dataclass(frozen=True)
+class Falls:
+    """Settled fallen poses.
+
+    Attributes:
+        side: name of the side of each pose, a key of `SIDES`.
+        qpos: settled generalized positions (n × 27), above the world's origin.
+        target_rad: joint targets that held them (n × 20).
+        hand_sha256: digest of the hand file they were settled with.
+    """
+
+    side: tuple[str, ...]
+    qpos: tuple[tuple[float, ...], ...]
+    target_rad: tuple[tuple[float, ...], ...]
+    hand_sha256: str
+
+
+@cache
+def load_falls() -> Falls:
+    """Reads `recovery_falls.json` beside this file."""
+    raw = json.loads(files("envs").joinpath("recovery_falls.json").read_text("utf-8"))
+    rows = {k: tuple(map(tuple, raw[k])) for k in ("qpos", "target_rad")}
+    return Falls(**(raw | rows | {"side": tuple(raw["side"])}))
+
+
+def falls_of(hand: HandFile, stance: Stance) -> Falls:
+    """Fallen poses of a hand: the stored ones, settled anew for another hand.
+
+    Raises:
+        InputError: the hand does not come to rest on one of its sides.
+    """
+    stored = load_falls()
+    return stored if hand.sha256 == stored.hand_sha256 else settle_falls(hand, stance)
+
+
+def falls_json(falls: Falls) -> str:
+    """The contents of `recovery_falls.json`, one pose a line."""
+    parts = {k: json.dumps(v) for k, v in vars(falls).items()}
+    for name in ("qpos", "target_rad"):
+        rows = ",\n  ".join(json.dumps(row) for row in getattr(falls, name))
+        parts[name] = f"[\n  {rows}\n ]"
+    body = ",\n ".join(f"{json.dumps(k)}: {v}" for k, v in parts.items())
+    return f"{{\n {body}\n}}\n"
+
+
+def settle_falls(hand: HandFile, stance: Stance) -> Falls:
+    """Settles `POSES_PER_SIDE` poses on each side; deterministic.
+
+    Args:
+        hand: the hand file.
+        stance: its stance, from which the fingers curl.
+
+    Raises:
+        InputError: the hand does not come to rest on one of its sides.
+    """
+    model = build_model(hand)
+    found = [(side, *pose) for side in SIDES for pose in _poses(model, stance, side)]
+    sides, qpos, targets = zip(*found, strict=True)
+    return Falls(sides, qpos, targets, hand.sha256)
+
+
+def clearance_m(model: mujoco.MjModel, qpos: np.ndarray) -> float:
+    """Least distance of the hand to the floor [m]; below 0 it reaches into it.
+
+    Args:
+        model: the scene.
+        qpos: generalized position (27).
+    """
+    data = mujoco.MjData(model)
+    data.qpos[:] = qpos
+    mujoco.mj_forward(model, data)
+    floor = model.geom(FLOOR).id
+    others = (geom for geom in range(model.ngeom) if geom != floor)
+    return min(
+        mujoco.mj_geomDistance(model, data, floor, geom, 5.0, None) for geom in others
+    )
+
+
+def down_b(qpos: np.ndarray) -> np.ndarray:
+    """Direction of gravity in the palm frame (3)."""
+    down = np.zeros(3)
+    mujoco.mju_rotVecQuat(
+        down, np.array([0.0, 0.0, -1.0]), qpos[3:7] * np.array([1, -1, -1, -1])
+    )
+    return down
+
+
+def _poses(model: mujoco.MjModel, stance: Stance, side: str) -> list[tuple]:
+    rng = np.random.default_rng([_SEED, list(SIDES).index(side)])
+    poses: list[tuple] = []
+    for _ in range(_TRIES):
+        target = _draw_curl(rng, model)
+        joints = _curl(model, stance, target)
+        data = _lie_down(model, joints, target, _draw_lean(rng, side))
+        if _rests_on(side, data):
+            poses.append((_floats(data.qpos), _floats(target)))
+        if len(poses) == POSES_PER_SIDE:
+            return poses
+    found = f"{len(poses)} of {_TRIES} falls"
+    raise InputError("falls", f"{side} side", found, f"{POSES_PER_SIDE} that rest")
+
+
+def _draw_curl(rng: np.random.Generator, model: mujoco.MjModel) -> np.ndarray:
+    fingers = [rng.uniform(*_THUMB_CURL), *rng.uniform(*_FINGER_CURL, size=(4, 4))]
+    return np.clip(np.concatenate(fingers), *model.jnt_range[1:].T)
+
+
+def _draw_lean(rng: np.random.Generator, side: str) -> np.ndarray:
+    """Orientation w x y z that turns the side, with some lean, downward."""
+    axis = np.add(SIDES[side], rng.uniform(-_LEAN, _LEAN, 3))
+    axis /= np.linalg.norm(axis)
+    quat = np.array([1.0 - axis[2], -axis[1], axis[0], 0.0])
+    return quat / np.linalg.norm(quat)
+
+
+def _curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarray:
+    """Joint angles after the fingers have curled from the stance, without weight."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = stance.qpos
+    data.qpos[2] = 1.0
+    start, steps = np.array(stance.target_rad), round(_CURL_S / PHYSICS_DT_S)
+    flags = model.opt.disableflags
+    model.opt.disableflags = flags | int(mujoco.mjtDisableBit.mjDSBL_GRAVITY)
+    for step in range(steps):
+        data.ctrl[:] = start + (target - start) * min(1.0, 1.5 * step / steps)
+        mujoco.mj_step(model, data)
+    model.opt.disableflags = flags
+    return data.qpos[7:].copy()
+
+
+def _lie_down(
+    model: mujoco.MjModel, joints: np.ndarray, target: np.ndarray, quat: np.ndarray
+) -> mujoco.MjData:
+    """Puts the hand down just above the floor and lets it settle."""
+    data = mujoco.MjData(model)
+    data.qpos[:] = [0.0, 0.0, 1.0, *quat, *joints]
+    data.qpos[2] -= clearance_m(model, data.qpos) - _GAP_M
+    data.ctrl[:] = target
+    for _ in range(round(SETTLE_S / PHYSICS_DT_S)):
+        mujoco.mj_step(model, data)
+    data.qpos[:2] = 0.0
+    return data
+
+
+def _rests_on(side: str, data: mujoco.MjData) -> bool:
+    still = np.abs(data.qvel).max() < _SLOWEST
+    down = down_b(data.qpos)
+    lowest = max(SIDES, key=lambda name: down @ SIDES[name])
+    return bool(still and lowest == side and down @ SIDES[side] > _LEAST_DOWN[side])
+
+
+def _floats(values: np.ndarray) -> tuple[float, ...]:
+    return tuple(round(float(value), 9) for value in values)

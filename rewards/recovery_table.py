@@ -1,0 +1,31 @@
+"""Reward table of fall recovery.
+
+The rows bind attributes of `envs.signals.Signals` and four extras that the caller adds:
+`gravity_v`, the unit vector of gravity in V, `height_m`, the height of the palm, and
+`stance_height_m` and `stance_joint_pos`, height and joint angles of the crawl stance.
+
+The paper names tilt, height and joint pose and gives no weight. All weights are ours:
+the three goals are of one size, and a fallen hand must be free to move, so rates and
+contacts of links, which it cannot avoid, cost little beside the crawl task's.
+"""
+
+from rewards.compose import RewardTable, RewardTerm
+from rewards.contact import undesired_contact
+from rewards.effort import joint_acceleration, torque
+from rewards.motion import roll_pitch_rate
+from rewards.smoothness import action_rate
+from rewards.stance import palm_tilt, stance_height, stance_pose
+
+RECOVERY: RewardTable = (
+    RewardTerm("palm_tilt", palm_tilt, -2.0, ("gravity_v",)),
+    RewardTerm("stance_height", stance_height, 1.0, ("height_m", "stance_height_m")),
+    RewardTerm(
+        "stance_pose", stance_pose, 2.0, ("joint_pos", "stance_joint_pos", "gravity_v")
+    ),
+    RewardTerm("undesired_contact", undesired_contact, -0.1, ("link_contact",)),
+    RewardTerm("roll_pitch_rate", roll_pitch_rate, -0.01, ("angvel_v",)),
+    RewardTerm("action_rate", action_rate, -0.01, ("action", "previous_action")),
+    RewardTerm("torque", torque, -2.5e-5, ("torque_nm",)),
+    RewardTerm("joint_acceleration", joint_acceleration, -2.5e-7, ("joint_acc",)),
+)
+"""The goals of fall recovery (paper) with weights of ours."""

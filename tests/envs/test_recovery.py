@@ -1,0 +1,170 @@
+import dataclasses
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from envs.config import from_dict, to_dict
+from envs.errors import InputError
+from envs.hand.hand_file import load_hand_file
+from envs.hand.model import build_model
+from envs.hand.stance import stance_of
+from envs.recovery import RecoveryConfig, RecoveryEnv
+from envs.recovery_falls import (
+    POSES_PER_SIDE,
+    SIDES,
+    clearance_m,
+    down_b,
+    falls_of,
+    load_falls,
+    settle_falls,
+)
+from envs.rotations import multiply
+from rewards import RECOVERY
+
+
+@pytest.fixture(scope="module")
+def recovery(make_compiled):
+    return make_compiled("recovery")
+
+
+def in_stance(state, stance):
+    qpos = jnp.tile(jnp.array(stance.qpos, jnp.float32), (len(state.reward), 1))
+    target = jnp.tile(jnp.array(stance.target_rad), (len(state.reward), 1))
+    drive = state.memory.drive
+    line = jnp.broadcast_to(target[:, None], drive.targets.shape)
+    held = drive.replace(targets=line, filtered=target, command=target)
+    data = state.data.replace(qpos=qpos, qvel=jnp.zeros_like(state.data.qvel))
+    memory = state.memory.replace(target=target, drive=held)
+    return state.replace(data=data, memory=memory)
+
+
+def test_sizes_are_those_of_the_crawl_policy(recovery):
+    assert recovery.batch.observation_size == {"state": 392, "privileged_state": 427}
+    logged = {k.removeprefix("reward/") for k in recovery.first.metrics if "/" in k}
+    assert logged == {row.name for row in RECOVERY}
+    env = RecoveryEnv()
+    assert (env.dt, env.episode_length) == (0.02, 1000)
+    assert env.config.action_scale_rad == 0.060
+
+
+def test_the_policy_is_asked_to_stand(recovery):
+    np.testing.assert_array_equal(recovery.first.obs["state"][:, -24:], 0)
+
+
+@pytest.mark.parametrize("index", range(2 * POSES_PER_SIDE))
+def test_stored_falls_rest_on_their_side_and_not_in_the_floor(index):
+    falls, model = load_falls(), build_model(load_hand_file())
+    qpos, side = np.array(falls.qpos[index]), falls.side[index]
+    assert -1.5e-3 < clearance_m(model, qpos) < 0
+    others = [name for name in SIDES if name != side]
+    along = {name: down_b(qpos) @ SIDES[name] for name in SIDES}
+    assert all(along[side] > along[other] for other in others)
+    assert along[side] > 0.25
+    # The fingers are curled: far from the stance, toward their upper limits.
+    assert np.mean(np.array(falls.target_rad[index]).reshape(5, 4)[1:, 2:]) > 0.6
+
+
+def test_clearance_sees_a_hand_in_the_floor():
+    """Negative control."""
+    qpos = np.array(load_falls().qpos[0])
+    qpos[2] -= 0.01
+    assert clearance_m(build_model(load_hand_file()), qpos) < -0.009
+
+
+def test_falls_hold_both_sides_and_differ():
+    falls = load_falls()
+    assert [falls.side.count(side) for side in SIDES] == [POSES_PER_SIDE] * 2
+    assert len(set(falls.qpos)) == len(set(falls.target_rad)) == 2 * POSES_PER_SIDE
+
+
+def test_stored_falls_are_those_of_the_default_hand():
+    hand = load_hand_file()
+    assert falls_of(hand, stance_of(hand)) is load_falls()
+    settled = settle_falls(hand, stance_of(hand))
+    assert settled.side == load_falls().side
+    np.testing.assert_allclose(settled.target_rad, load_falls().target_rad, atol=1e-8)
+    np.testing.assert_allclose(settled.qpos, load_falls().qpos, atol=1e-4)
+
+
+def test_another_hand_falls_anew(monkeypatch):
+    hand = load_hand_file()
+    mass = dataclasses.replace(hand.payload_mass, value=0.04)
+    light = dataclasses.replace(hand, payload_mass=mass)
+    falls = falls_of(light, stance_of(light))
+    assert falls.hand_sha256 == light.sha256 != hand.sha256
+    assert falls.qpos != load_falls().qpos
+    monkeypatch.setattr("envs.recovery_falls._TRIES", 3)
+    with pytest.raises(InputError, match=r"falls: thumb side: found \d of 3 falls"):
+        settle_falls(light, stance_of(light))
+
+
+def test_starts_draw_every_fall_at_every_heading(recovery):
+    env = recovery.batch.env
+    print("seed 20260122")
+    keys = jax.random.split(jax.random.key(20260122), 600)
+    states, targets = jax.vmap(lambda key: env.task.start(key, env.plant))(keys)
+    joints = np.asarray(env.task.falls.qpos, np.float32)[:, 7:]
+    drawn = np.abs(states.qpos[:, None, 7:] - joints).max(axis=2).argmin(axis=1)
+    assert len(np.unique(drawn)) == len(joints)
+    held = np.asarray(env.task.falls.target_rad, np.float32)[drawn]
+    np.testing.assert_array_equal(targets, held)
+    assert not np.asarray(states.qvel).any()
+    pose = np.asarray(env.task.falls.qpos)[drawn, 3:7] * [1, -1, -1, -1]
+    turn = jax.vmap(multiply)(states.qpos[:, 3:7], jnp.asarray(pose))
+    np.testing.assert_allclose(turn[:, 1:3], 0, atol=1e-5)
+    heading = np.mod(2 * np.arctan2(turn[:, 3], turn[:, 0]), 2 * np.pi)
+    assert np.histogram(heading, 4, (0, 2 * np.pi))[0].min() > 100
+
+
+def test_a_fallen_hand_stays_down_and_its_episode_goes_on(recovery):
+    still = np.zeros((recovery.batch.episode_length, 8, 20), np.float32)
+    states = recovery.roll(recovery.first, still)
+    assert not any(np.asarray(state.done).any() for state in states[:-1])
+    np.testing.assert_array_equal(states[-1].info["truncation"], 1)
+    for state in states:
+        assert (np.asarray(state.metrics["tilt_deg"]) > 45).all()
+        np.testing.assert_array_equal(state.metrics["upright"], 0)
+    # It was at rest: nothing pushes it out of the floor or makes it roll.
+    moved = np.abs(states[-2].data.qpos[:, :3] - recovery.first.data.qpos[:, :3])
+    assert moved.max() < 0.02
+
+
+def test_the_stance_is_upright_and_pays_most(recovery):
+    zero = np.zeros((8, 20), np.float32)
+    fallen = recovery.step(recovery.first, zero)
+    stood = recovery.step(in_stance(recovery.first, recovery.batch.stance), zero)
+    np.testing.assert_array_equal(stood.metrics["upright"], 1)
+    assert (np.asarray(stood.metrics["joint_error_rad"]) < 0.03).all()
+    assert (np.asarray(stood.reward) > np.asarray(fallen.reward) + 0.02).all()
+    assert (np.asarray(stood.reward) > 0.9 * 3 * 0.02).all()
+
+
+@pytest.mark.parametrize(("speed_rps", "upright"), [(2.0, 1), (6.0, 0)])
+def test_a_fast_hand_is_not_upright(recovery, speed_rps, upright):
+    state = in_stance(recovery.first, recovery.batch.stance)
+    raised = state.data.qpos.at[:, 2].add(0.3)  # so that no finger brakes the turn
+    spinning = state.data.qvel.at[:, 5].set(speed_rps)
+    data = state.data.replace(qpos=raised, qvel=spinning)
+    after = recovery.step(state.replace(data=data), np.zeros((8, 20), np.float32))
+    assert (np.asarray(after.metrics["tilt_deg"]) < 10).all()
+    np.testing.assert_array_equal(after.metrics["upright"], upright)
+
+
+def test_fingers_collide_with_each_other():
+    """The paper's failures are fingers caught on each other."""
+    model = build_model(load_hand_file())
+    for one in range(1, 6):
+        for other in range(one + 1, 6):
+            a, b = (model.geom(f"finger{n}_link4") for n in (one, other))
+            assert a.contype[0] & b.conaffinity[0] or b.contype[0] & a.conaffinity[0]
+
+
+def test_configuration_survives_a_file_and_names_wrong_weights():
+    config = RecoveryConfig(weights={"palm_tilt": -3.0}, episode_s=10.0)
+    assert from_dict(RecoveryConfig, to_dict(config), "file") == config
+    with pytest.raises(InputError, match=r"weights\.lift"):
+        RecoveryConfig(weights={"lift": 1.0})
+    with pytest.raises(InputError, match="control_dt_s"):
+        RecoveryConfig(control_dt_s=0.013)
