@@ -12,8 +12,20 @@ import numpy as np
 from fingers_deploy.errors import InputError
 from fingers_deploy.record.log import EVENTS_TOPIC, METADATA, encode_string
 from fingers_deploy.record.mcap_write import McapWriter
+from fingers_deploy.record.ros import (
+    COMMANDS_TOPIC,
+    IMU,
+    IMU_TEXT,
+    IMU_TOPIC,
+    JOINT_STATE,
+    JOINT_STATE_TEXT,
+    STATES_TOPIC,
+    JointStates,
+    encode_imu,
+)
 from fingers_deploy.record.row import (
     CDR_HEADER,
+    ROW,
     SCHEMA_NAME,
     SCHEMA_VERSION,
     TOPIC,
@@ -60,6 +72,7 @@ class Recorder:
             "start_unix_s": repr(self._start_unix_s),
             **metadata,
         }
+        self._joint_states = JointStates(joint_names)
         self.files: list[Path] = []
         self.dropped = 0
         self.error = ""
@@ -101,8 +114,28 @@ class Recorder:
         writer = McapWriter(os.fdopen(handle, "wb"), "ros2", "fingers-deploy")
         self._rows = writer.add_channel(TOPIC, SCHEMA_NAME, schema_text())
         self._events = writer.add_channel(EVENTS_TOPIC, "std_msgs/msg/String", _STRING)
+        self._commands = writer.add_channel(
+            COMMANDS_TOPIC, JOINT_STATE, JOINT_STATE_TEXT
+        )
+        self._states = writer.add_channel(STATES_TOPIC, JOINT_STATE, JOINT_STATE_TEXT)
+        self._imu = writer.add_channel(IMU_TOPIC, IMU, IMU_TEXT)
         writer.add_metadata(METADATA, self._metadata)
         return writer
+
+    def _add(self, channel: int, time_ns: int, data: bytes) -> None:
+        """Adds a message; a row also in the words of ROS 2, without gaps filled."""
+        self._writer.add_message(channel, time_ns, data)
+        if channel != self._rows:
+            return
+        row = np.frombuffer(data, ROW, offset=len(CDR_HEADER))[0]
+        command = self._joint_states.encode(time_ns, row["cmd"])
+        self._writer.add_message(self._commands, time_ns, command)
+        if np.isfinite(row["pos"]).all():
+            state = self._joint_states.encode(time_ns, row["pos"], row["cur"])
+            self._writer.add_message(self._states, time_ns, state)
+        if np.isfinite(row["quat"]).all():
+            imu = encode_imu(time_ns, row["quat"], row["gyro"])
+            self._writer.add_message(self._imu, time_ns, imu)
 
     def _run(self) -> None:
         try:
@@ -115,7 +148,7 @@ class Recorder:
         while (item := self._queue.get()) is not None:
             channel, t_s, data = item
             unix_s = self._start_unix_s + (t_s - self._start_s)
-            self._writer.add_message(channel, round(unix_s * 1e9), data)
+            self._add(channel, round(unix_s * 1e9), data)
             if time.monotonic() - flushed > _FLUSH_S:
                 self._writer.flush()
                 flushed = time.monotonic()

@@ -65,6 +65,26 @@ def test_an_independent_reader_agrees(tmp_path):
         assert abs(stamp - read[0][0] - 1e9 * row["t"]) < 1e4
 
 
+def test_ros_tools_and_sysid_read_the_same_numbers(tmp_path):
+    recorder, rows = _record(tmp_path, 60)
+    with AnyReader([recorder.files[0]]) as reader:
+        found = {}
+        for c, _, raw in reader.messages():
+            found.setdefault(c.topic, []).append(reader.deserialize(raw, c.msgtype))
+    for k, row in enumerate(rows):
+        state, command, imu = (
+            found[topic][k] for topic in ("/joint_states", "/joint_commands", "/imu")
+        )
+        assert tuple(state.name) == JOINTS == tuple(command.name)
+        np.testing.assert_array_equal(state.position, row["pos"].astype(float))
+        np.testing.assert_array_equal(state.effort, row["cur"].astype(float))
+        np.testing.assert_array_equal(command.position, row["cmd"].astype(float))
+        q, w = imu.orientation, imu.angular_velocity
+        np.testing.assert_array_equal([q.w, q.x, q.y, q.z], row["quat"].astype(float))
+        np.testing.assert_array_equal([w.x, w.y, w.z], row["gyro"].astype(float))
+        assert imu.linear_acceleration_covariance[0] == -1
+
+
 def test_the_message_definition_has_the_size_of_the_record():
     sizes = {"float64": 8, "float32": 4, "uint32": 4, "uint8": 1}
     total = 0
