@@ -8,6 +8,8 @@ from fingers_deploy.errors import InputError
 from fingers_deploy.record import read_log
 from fingers_deploy.record.recorder import Recorder
 from fingers_deploy.record.row import NAMES, ROW, empty_row, schema_text
+from sysid.data_bag import BagMap
+from sysid.data_read import read_log as read_measured_log
 
 JOINTS = tuple(f"finger{f}_joint{j}" for f in range(1, 6) for j in range(1, 5))
 
@@ -83,6 +85,21 @@ def test_ros_tools_and_sysid_read_the_same_numbers(tmp_path):
         np.testing.assert_array_equal([q.w, q.x, q.y, q.z], row["quat"].astype(float))
         np.testing.assert_array_equal([w.x, w.y, w.z], row["gyro"].astype(float))
         assert imu.linear_acceleration_covariance[0] == -1
+
+
+def test_identification_reads_a_recording_as_it_is(tmp_path):
+    recorder, rows = _record(tmp_path, 60)
+    topics = BagMap(imu="/imu", effort="cur", mounting="free")
+    log = read_measured_log(recorder.files[0], topics)
+    assert log.header.joints == JOINTS
+    for name, index in (("cmd", 6), ("pos", 6), ("cur", 6)):
+        column = log.columns[f"{name}.finger2_joint3"]
+        there = ~np.isnan(column)
+        np.testing.assert_array_equal(column[there], rows[name][:, index].astype(float))
+    gyro = log.columns["gyro.y"]
+    np.testing.assert_array_equal(
+        gyro[~np.isnan(gyro)], rows["gyro"][:, 1].astype(float)
+    )
 
 
 def test_the_message_definition_has_the_size_of_the_record():
