@@ -43,9 +43,9 @@ class RecoveryConfig(HandSettings):
     """
 
     command: CommandConfig = field(default_factory=_no_command)
-    # A curled hand on the floor touches itself and the floor with many links.
+    # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
+    # 14 contacts under random actions, and Warp's pool also holds the near pairs.
     contacts_per_world: int = field(default=96, metadata={"low": 1})
-    constraints_per_world: int = field(default=256, metadata={"low": 1})
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -32,11 +32,11 @@ GAIT_S = 8.0
 
 
 def nominal(setup: Setup) -> Setup:
-    """Returns `setup` with the nominal hand, no noise and a start in the stance."""
+    """Returns `setup` with the nominal hand, and no noise, not at the start either."""
     calm = no_randomization(setup.hand.tip_friction.value)
-    env = dataclasses.replace(
-        setup.env, randomize=calm, reset_joint_rad=0.0, reset_speed_mps=0.0
-    )
+    noise = ("reset_joint_rad", "reset_speed_mps")  # of tasks that start in the stance
+    still = {name: 0.0 for name in noise if hasattr(setup.env, name)}
+    env = dataclasses.replace(setup.env, randomize=calm, **still)
     return dataclasses.replace(setup, env=env)
 
 

@@ -91,9 +91,12 @@ def test_presets_in_the_training_guide_are_those_of_the_code():
     }
 
 
-def test_rewards_in_the_environment_guide_are_those_of_the_code():
-    from rewards import CRAWL
+@pytest.mark.parametrize(
+    ("guide", "table"), [("environment.md", "CRAWL"), ("tasks.md", "RECOVERY")]
+)
+def test_rewards_in_the_guides_are_those_of_the_code(guide, table):
+    import rewards
 
-    text = (ROOT / "docs" / "environment.md").read_text("utf-8")
+    text = (ROOT / "docs" / guide).read_text("utf-8")
     rows = re.findall(r"^\| `(\w+)` \| [−\d]", text, re.MULTILINE)
-    assert rows == [row.name for row in CRAWL]
+    assert rows == [row.name for row in getattr(rewards, table)]

@@ -20,6 +20,7 @@ from envs.recovery_falls import (
     load_falls,
     settle_falls,
 )
+from envs.registry import make_batch
 from envs.rotations import multiply
 from rewards import RECOVERY
 
@@ -159,6 +160,33 @@ def test_fingers_collide_with_each_other():
         for other in range(one + 1, 6):
             a, b = (model.geom(f"finger{n}_link4") for n in (one, other))
             assert a.contype[0] & b.conaffinity[0] or b.contype[0] & a.conaffinity[0]
+
+
+def poses(backend, sign=1.0):
+    """Generalized positions of three control steps of eight worlds."""
+    batch = make_batch("recovery", 8, backend=backend, auto_reset=False)
+    state = jax.jit(make_batch("recovery", 8).reset)(jax.random.key(20260123))
+    step, rng = jax.jit(batch.step), np.random.default_rng(20260123)
+    print("seed 20260123")
+    for _ in range(3):
+        action = sign * rng.normal(0, 0.6, (8, 20))
+        state = step(state, action.astype(np.float32))
+    assert not np.asarray(state.metrics["contact_overflow"]).any()
+    return np.asarray(state.data.qpos)
+
+
+@pytest.mark.parametrize(
+    "backend",
+    [
+        pytest.param("jax", marks=pytest.mark.slow),
+        pytest.param("warp", marks=pytest.mark.gpu),
+    ],
+)
+def test_a_fallen_hand_moves_alike_on_every_backend(backend):
+    """Boxes and capsules on the floor touch in other points, but nearly alike."""
+    on_cpu = poses("cpu")
+    assert np.abs(poses(backend) - on_cpu).max() < 1e-3
+    assert np.abs(poses("cpu", -1.0) - on_cpu).max() > 5e-3  # negative control
 
 
 def test_configuration_survives_a_file_and_names_wrong_weights():
