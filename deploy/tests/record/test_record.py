@@ -19,6 +19,7 @@ def _random_row(rng, t):
     for name in NAMES:
         if row[name].dtype.kind == "f":
             row[name] = rng.standard_normal(row[name].shape)
+    row["quat"] /= np.linalg.norm(row["quat"])
     row["t"] = t
     return row
 
