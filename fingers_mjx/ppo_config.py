@@ -123,8 +123,18 @@ def fast() -> TrainConfig:
 
 
 def cpu() -> TrainConfig:
-    """Returns small settings for a few CPU cores: learning shows within minutes."""
-    ppo = PpoConfig(actor_layers=(256, 128), critic_layers=(256, 128))
+    """Returns small settings for a few CPU cores: learning shows within minutes.
+
+    Small outputs and little noise at the start: the hand stands at first and learns to
+    stay up within some ten iterations, instead of some hundred.
+    """
+    ppo = PpoConfig(
+        entropy_cost=0.003,
+        actor_layers=(256, 128),
+        critic_layers=(256, 128),
+        init_noise_std=0.4,
+        init_mean_scale=0.01,
+    )
     return TrainConfig(
         preset="cpu",
         num_envs=256,
