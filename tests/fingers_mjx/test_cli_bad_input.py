@@ -155,7 +155,7 @@ SPOILT = [
     ("bundle/config.yaml", remove, ["eval", "bundle"], ["config.yaml"]),
     (
         "bundle/config.yaml",
-        replace("action_clip: 1.0", "action_clip: 2.0"),
+        replace("action_scale_rad: 0.06", "action_scale_rad: 0.07"),
         ["play", "bundle"],
         ["bundle", "config.yaml", "SHA-256", "export"],
     ),

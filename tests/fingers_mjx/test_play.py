@@ -132,7 +132,7 @@ def test_a_schedule_replaces_the_commands(player):
 
 def test_a_fall_ends_the_episode_and_counts(setup, tmp_path):
     """A policy that throws the hand over."""
-    weights = random_weights(seed=1, gain=30.0)
+    weights = random_weights(1, setup.env.action_clip, gain=3.0)
     bundle = load_bundle(make_bundle(tmp_path / "wild", setup, weights))
     session = play_episodes(Player(make_env(setup, 1, "cpu"), bundle), 3, 100)
     survived = session.table.columns["survival"]
