@@ -1,0 +1,66 @@
+"""All effects by name, in the order in which a model should have them."""
+
+from collections.abc import Mapping
+
+from envs.errors import InputError, one_of
+from envs.hand.effects import (
+    armature,
+    asymmetric_friction,
+    asymmetric_viscous,
+    backlash,
+    command_quantization,
+    coulomb_friction,
+    damping,
+    deadband,
+    encoder_eccentricity,
+    encoder_offset,
+    encoder_scale,
+    load_friction,
+    lowpass_cutoff,
+    sensor_latency,
+    slew_limit,
+    stiffness,
+    stribeck_friction,
+    torque_limit,
+    torque_slope_limit,
+    transport_delay,
+    viscous_friction,
+)
+from envs.hand.effects.base import EffectKind
+
+_MODULES = (
+    transport_delay,
+    command_quantization,
+    lowpass_cutoff,
+    slew_limit,
+    encoder_offset,
+    encoder_scale,
+    encoder_eccentricity,
+    stiffness,
+    damping,
+    deadband,
+    torque_limit,
+    torque_slope_limit,
+    backlash,
+    coulomb_friction,
+    viscous_friction,
+    stribeck_friction,
+    load_friction,
+    asymmetric_friction,  # after all that it may take from
+    asymmetric_viscous,
+    armature,
+    sensor_latency,
+)
+
+CATALOGUE: Mapping[str, EffectKind] = {m.EFFECT.name: m.EFFECT for m in _MODULES}
+
+
+def effect_kind(name: str) -> EffectKind:
+    """Returns an effect by name.
+
+    Raises:
+        InputError: there is none of this name.
+    """
+    if name not in CATALOGUE:
+        raise InputError("effect", "name", name, one_of(CATALOGUE, name))
+    return CATALOGUE[name]

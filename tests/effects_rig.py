@@ -1,0 +1,62 @@
+"""One joint with effects, run for many substeps; shared by the tests of effects."""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.hand.effects.joint import joint_step
+
+DT = 1e-3
+KP, KD, INERTIA = 2.0, 0.05, 1e-3
+
+
+def run(effects, target, load=0.0, q0=0.0, v0=0.0, kp=KP, kd=KD, dt=DT):
+    """Angle, speed and signals after every substep, as arrays [steps, ...].
+
+    Args:
+        effects: parameters by the effects' names, in order.
+        target: targets [rad], the first one sent since ever.
+        load: torque from outside [N·m], constant or one per substep.
+        q0, v0: initial angle and speed.
+        kp, kd: nominal gains.
+        dt: substep [s].
+    """
+    target = jnp.asarray(target, jnp.float32)
+    load = jnp.broadcast_to(jnp.asarray(load, jnp.float32), target.shape)
+    params = tuple({k: jnp.asarray(v) for k, v in p.items()} for p in effects.values())
+    out = _run(tuple(effects), params, target, load, q0, v0, kp, kd, dt)
+    return jax.tree.map(np.asarray, out)
+
+
+@partial(jax.jit, static_argnames=("names", "dt"))
+def _run(names, params, target, load, q0, v0, kp, kd, dt):
+    model = tuple((CATALOGUE[n], p) for n, p in zip(names, params, strict=True))
+    q0, v0 = (jnp.broadcast_to(x, target.shape[1:]).astype(float) for x in (q0, v0))
+
+    def step(carry, inputs):
+        states, q, v = carry
+        states, x = chain_step(model, states, inputs[0], q, v, inputs[1], kp, kd, dt)
+        q, v = joint_step(x, INERTIA, dt)
+        return (states, q, v), (q, v, x)
+
+    start = (init_states(model, target[0], q0, dt), q0, v0)
+    return jax.lax.scan(step, start, (target, load))[1]
+
+
+def steps(seconds, dt=DT):
+    return round(seconds / dt)
+
+
+def hold(angle, seconds, dt=DT):
+    return np.full(steps(seconds, dt), float(angle))
+
+
+def jump(angle, seconds, dt=DT):
+    """Zero once, then an angle."""
+    target = hold(angle, seconds, dt)
+    target[0] = 0.0
+    return target
