@@ -25,7 +25,8 @@ check: sync ## What CI runs first: style, types, quick tests; changes nothing
 	$(RUN) pytest -q -n 2 $(QUICK)
 
 test: sync ## All tests for two CPU cores
-	$(RUN) pytest -n 2 --dist loadfile
+	$(RUN) pytest tests -n 2 --dist loadfile
+	$(RUN) pytest deploy/tests # alone: some of them run in real time
 
 test-slow: sync ## The large versions of the tests; they print their seeds
 	$(RUN) pytest -m slow
