@@ -20,6 +20,7 @@ _EXTRAS = {
     "imageio_ffmpeg": "viz",
     "PIL": "viz",
     "jinja2": "viz",
+    "rosbags": "data",
     "pyarrow": "viz",
 }
 

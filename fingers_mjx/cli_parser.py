@@ -34,7 +34,7 @@ def make_parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for add in (_train, _eval, _export, _play, _hand, _demo):
+    for add in (_train, _eval, _export, _play, _hand, _sysid, _demo):
         add(commands)
     return parser
 
@@ -234,6 +234,20 @@ def _hand(commands) -> None:
         action.add_argument(
             "--hand", type=Path, metavar="FILE", help="default: the paper's hand"
         )
+
+
+def _sysid(commands) -> None:
+    parser = _command(commands, "sysid", "cli_sysid", "look at measured logs")
+    actions = parser.add_subparsers(metavar="ACTION", required=True, dest="action")
+    info = actions.add_parser(
+        "info",
+        help="tell what a log holds",
+        description="Tells joints, columns, ranges, rates, gaps and clock steps.",
+    )
+    info.add_argument("log", type=Path, metavar="LOG", help="CSV, Parquet, MCAP, bag")
+    info.add_argument(
+        "--map", type=Path, metavar="FILE", help="topics and names of a bag, as YAML"
+    )
 
 
 def _demo(commands) -> None:

@@ -1,0 +1,15 @@
+"""`fingers sysid info`."""
+
+import argparse
+
+from envs.config import load_yaml
+from sysid.data_bag import BagMap
+from sysid.data_info import info_lines
+from sysid.data_read import read_log
+
+
+def run(args: argparse.Namespace) -> int:
+    """Shows what a measured log holds."""
+    bag_map = load_yaml(BagMap, args.map) if args.map else None
+    print("\n".join(info_lines(read_log(args.log, bag_map))))
+    return 0
