@@ -85,7 +85,7 @@ class Player:
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
         memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
-        self.controller.reset()
+        self.controller.reset(np.asarray(start.memory.target))
         while len(rows) < steps and not (rows and rows[-1].done):
             if schedule is not None:
                 command = jnp.asarray(schedule[len(rows)])
