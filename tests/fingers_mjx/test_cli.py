@@ -11,6 +11,7 @@ from envs.hand.hand_file import DEFAULT_HAND_FILE
 from envs.hand.stance import load_stance
 from fingers_mjx import checkpoint
 from fingers_mjx.cli import main
+from fingers_mjx.demo import POLICY_DIR
 from fingers_mjx.evaluate_files import read_table
 from fingers_mjx.policy_source import load_source
 from fingers_mjx.rundir_metrics import read_metrics
@@ -156,12 +157,15 @@ def test_play_writes_video_and_summary(bundle_dir, tmp_path, capsys):
     assert "path_speed_mps" in capsys.readouterr().out
 
 
-def test_play_draws_the_worlds_of_the_evaluation(bundle_dir, tmp_path):
-    """Same seed, same worlds: the sim-to-sim check compares like with like."""
+def test_play_draws_the_worlds_of_the_evaluation(tmp_path):
+    """Same seed, same worlds: the sim-to-sim check compares like with like.
+
+    With the committed policy: one that stumbles magnifies the last bits.
+    """
     paths = [tmp_path / f"{name}.json" for name in ("eval", "play")]
-    common = [str(bundle_dir), "--episodes", "3", "--seed", "4", "--json"]
-    assert main(["eval", *common, str(paths[0]), "--steps", "20"]) == 0
-    argv = ["play", *common, str(paths[1]), "--seconds", "0.4", "--randomize"]
+    common = [str(POLICY_DIR), "--episodes", "3", "--seed", "4", "--json"]
+    assert main(["eval", *common, str(paths[0]), "--steps", "200"]) == 0
+    argv = ["play", *common, str(paths[1]), "--seconds", "4", "--randomize"]
     assert main(argv) == 0
     ours, theirs = (json.loads(p.read_text())["measures"] for p in paths)
     for name in ("command_speed_mps", "command_turn_rate_rad_s"):
