@@ -12,6 +12,7 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.errors import InputError
 from fingers_mjx.evaluate_record import MASS_KG, Trace, episode_measures, record
+from fingers_mjx.measures import steps_alive
 
 REPORT_EVERY = 50
 Policy = Callable[[dict[str, Array]], Float[Array, "B actions"]]
@@ -52,7 +53,7 @@ class EpisodeTable:
     def episode(self, index: int) -> Trace:
         """Returns the steps of one episode that count, time first."""
         one = jax.tree.map(lambda x: x[:, index], self.traces)
-        length = int(np.cumprod(~one.done).sum())
+        length = int(steps_alive(one.done, one.failed).sum())
         return jax.tree.map(lambda x: x[:length], one)
 
 
@@ -68,7 +69,8 @@ def evaluate(
     """Runs a policy and measures each episode up to its first `done`.
 
     Batches are run until there are `episodes`; what a world does after its first `done`
-    is ignored, so it does not matter whether the environment resets itself. An episode
+    is ignored, so it does not matter whether the environment resets itself, as long as
+    the signals of that step are its own (`envs.batch.BatchEnv` keeps them). An episode
     that is still running after `steps` counts as survived.
 
     Args:

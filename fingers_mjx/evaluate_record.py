@@ -78,19 +78,20 @@ def episode_measures(
 ) -> dict[str, Float[Array, ""]]:
     """Returns every measure of one episode by name; NaN where undefined.
 
-    An episode lasts until its first `done` and no step after it counts.
+    An episode lasts until its first `done` and no step after it counts; for that step
+    itself see `measures.steps_alive`.
 
     Args:
         trace: one episode, time first.
         dt_s: control interval.
         mass_kg: of the hand and what it carries.
     """
-    alive = measures.steps_alive(trace.done)
-    before_end = alive | (jnp.cumsum(trace.done) == 1) & trace.done
+    alive = measures.steps_alive(trace.done, trace.failed)
+    to_the_end = measures.steps_alive(trace.done, jnp.zeros_like(trace.failed))
     return {
         "task_speed_mps": measures.task_speed_mps(trace.vel_v, trace.command, alive),
         **_contact_measures(trace, alive),
-        "survival": measures.survival(trace.failed & before_end),
+        "survival": measures.survival(trace.failed & to_the_end),
         **_motion_measures(trace, alive, dt_s, mass_kg),
     }
 

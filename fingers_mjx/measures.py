@@ -227,13 +227,16 @@ def survival(failed: Bool[Array, " T"]) -> Float[Array, ""]:
     return 1.0 - failed.any().astype(jnp.float32)
 
 
-def steps_alive(done: Bool[Array, " T"]) -> Bool[Array, " T"]:
-    """Tells which steps come before the first `done`.
+def steps_alive(
+    done: Bool[Array, " T"], failed: Bool[Array, " T"]
+) -> Bool[Array, " T"]:
+    """Tells which steps of the first episode count.
 
-    The step of `done` itself does not count: an environment that resets itself has
-    already replaced its signals by those of the next episode.
+    All up to the first `done`. That step itself counts where the time limit ended the
+    episode, and not where a failure did: a fallen hand walks no more.
     """
-    return jnp.cumsum(done.astype(jnp.int32)) == 0
+    ended = jnp.cumsum(done.astype(jnp.int32))
+    return (ended - done == 0) & ~failed
 
 
 def _participation(

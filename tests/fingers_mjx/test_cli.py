@@ -158,21 +158,22 @@ def test_play_writes_video_and_summary(bundle_dir, tmp_path, capsys):
 
 
 def test_play_draws_the_worlds_of_the_evaluation(tmp_path):
-    """Same seed, same worlds: the sim-to-sim check compares like with like.
+    """Same seed, same worlds, same steps: the sim-to-sim check compares like with like.
 
-    With the committed policy: one that stumbles magnifies the last bits.
+    Over so few steps that the last bits, which contacts magnify, do not tell yet; a
+    step more or less, or a first step of another kind, tells.
     """
     paths = [tmp_path / f"{name}.json" for name in ("eval", "play")]
     common = [str(POLICY_DIR), "--episodes", "3", "--seed", "4", "--json"]
-    assert main(["eval", *common, str(paths[0]), "--steps", "200"]) == 0
-    argv = ["play", *common, str(paths[1]), "--seconds", "4", "--randomize"]
+    assert main(["eval", *common, str(paths[0]), "--steps", "20"]) == 0
+    argv = ["play", *common, str(paths[1]), "--seconds", "0.4", "--randomize"]
     assert main(argv) == 0
     ours, theirs = (json.loads(p.read_text())["measures"] for p in paths)
-    for name in ("command_speed_mps", "command_turn_rate_rad_s"):
+    assert ours["duration_s"]["mean"] == pytest.approx(0.4)
+    for name in ("command_speed_mps", "command_turn_rate_rad_s", "duration_s"):
         assert theirs[name]["mean"] == pytest.approx(ours[name]["mean"], rel=1e-6)
     for name in ("task_speed_mps", "mean_contact_tilt_deg", "energy_j"):
-        spread = 0.05 * (abs(ours[name]["mean"]) + ours[name]["std"])
-        assert theirs[name]["mean"] == pytest.approx(ours[name]["mean"], abs=spread)
+        assert theirs[name]["mean"] == pytest.approx(ours[name]["mean"], rel=1e-3)
 
 
 @pytest.mark.slow

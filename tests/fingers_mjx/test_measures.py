@@ -215,7 +215,9 @@ def test_turn_rate_error_ignores_swing_within_strides_but_not_bias():
 
 def test_survival_and_the_end_of_an_episode():
     done = jnp.array([0, 0, 1, 0, 1]) > 0
-    np.testing.assert_array_equal(ms.steps_alive(done), [1, 1, 0, 0, 0])
+    np.testing.assert_array_equal(ms.steps_alive(done, done), [1, 1, 0, 0, 0])
+    in_time = ms.steps_alive(done, done & False)
+    np.testing.assert_array_equal(in_time, [1, 1, 1, 0, 0])
     assert ms.survival(done) == 0
     assert ms.survival(done & False) == 1
 
