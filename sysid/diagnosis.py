@@ -1,0 +1,118 @@
+"""What a diagnosis says, in the form of `diagnosis.json`."""
+
+import json
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
+
+Verdict = Literal["none", "found", "ambiguous", "unexplained", "not_observable"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its 95 % interval."""
+
+    value: float
+    low: float
+    high: float
+    unit: str
+
+
+@dataclass(frozen=True)
+class Cause:
+    """An effect that the measurement has and the simulation lacks.
+
+    Attributes:
+        effect: name in the catalogue.
+        where: a joint, or `flexion`, `abduction`, `pip`, `dip`, a finger, `all`.
+        parameters: estimates by parameter name.
+        evidence: gain in log predictive density on held-out data [nat].
+    """
+
+    effect: str
+    where: str
+    parameters: dict[str, Estimate]
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Alternative:
+    """A rival of the first cause.
+
+    Attributes:
+        effect: name in the catalogue.
+        score_gap: how much worse it predicts held-out data [nat].
+        distinguishable: whether these records tell it apart from the cause.
+    """
+
+    effect: str
+    score_gap: float
+    distinguishable: bool
+
+
+@dataclass(frozen=True)
+class Gain:
+    """Error on data that no fit saw, before and after the causes are added.
+
+    Attributes:
+        heldout_rmse_before, heldout_rmse_after: in `unit`.
+        explained_fraction: share of the removable variance (above the noise floor)
+            that the causes remove; `low` and `high` bound it at 95 %.
+        unit: of the errors.
+        noise_floor: error that no model can remove, in `unit`; None if not known.
+    """
+
+    heldout_rmse_before: float
+    heldout_rmse_after: float
+    explained_fraction: float
+    low: float
+    high: float
+    unit: str
+    noise_floor: float | None
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """The verdict on records of one mechanism; see `sysid.diagnose`.
+
+    Attributes:
+        verdict: `none` nothing significant; `found` causes by name; `ambiguous` one of
+            several that these records cannot tell apart; `unexplained` something that
+            no effect of the catalogue explains; `not_observable` the records excite
+            too little to say.
+        causes: in order of gain.
+        alternatives: rivals of the first cause, nearest first.
+        gain: on held-out data; None without causes.
+        residual_gains: the same for each residual: `position`, `controller`,
+            `mechanics`.
+        next_experiment: what to record next, in one sentence; "" if nothing is needed.
+        not_observable: effects that these records could not show at a size that
+            matters.
+        unexplained: where an error remains that no effect explains.
+        warnings: bounds met, poor excitation, doubtful data.
+        summary: the verdict in words.
+        log_sha256: digests of the records.
+        seed: of everything random.
+        runtime_s: time taken [s].
+    """
+
+    verdict: Verdict
+    causes: tuple[Cause, ...]
+    alternatives: tuple[Alternative, ...]
+    gain: Gain | None
+    next_experiment: str
+    log_sha256: tuple[str, ...]
+    seed: int
+    runtime_s: float
+    residual_gains: dict[str, Gain] = field(default_factory=dict)
+    not_observable: tuple[str, ...] = ()
+    unexplained: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    summary: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Returns plain data."""
+        return asdict(self)
+
+    def to_json(self) -> str:
+        """Returns the contents of `diagnosis.json`."""
+        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)

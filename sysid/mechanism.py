@@ -1,0 +1,190 @@
+"""What was measured: joints with rigid-body model, drive and tolerances.
+
+A mechanism is the simulation as it stands: rigid bodies in MuJoCo, and for every joint
+the gains of its servo and the effects (of `envs.hand.effects`) that the simulation
+already has. Each figure has a tolerance within which it may differ without being news.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+from envs.config import load_yaml
+from envs.errors import InputError, one_of
+from envs.hand.effects.catalogue import effect_kind
+from envs.hand.figures import FINGERS, figures
+from envs.hand.hand_file import HandFile, load_hand_file
+from envs.hand.model import build_spec
+from envs.quiet_mujoco import mujoco
+
+SCHEMA = 1
+Effort = Literal["tau", "cur", "duty", "none"]
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure of the drive and how well it is known.
+
+    Attributes:
+        value: the figure.
+        tolerance: relative deviation (one sigma) that is no news; for a figure of zero
+            in its own unit.
+        free: whether nothing is known of it: a fit may choose it, and that is no news.
+    """
+
+    value: float
+    tolerance: float = field(default=0.05, metadata={"low": 0.0, "high": 10.0})
+    free: bool = False
+
+
+@dataclass(frozen=True)
+class JointDrive:
+    """Drive of one joint as simulated so far.
+
+    Attributes:
+        kp: position gain [N·m/rad, or N/m].
+        kd: velocity gain [N·m·s/rad, or N·s/m].
+        kp_setting: name of a setting in the logs' headers that multiplies `kp` and
+            `kd_per_kp`; "" if the gain is the same in all records.
+        effort: column that tells the effort of the drive.
+        effort_scale: N·m (or N) per unit of that column.
+        effects: effects that the simulation has, with their parameters by name.
+    """
+
+    kp: Figure
+    kd: Figure
+    kp_setting: str = ""
+    effort: Effort = "tau"
+    effort_scale: Figure = field(default_factory=lambda: Figure(1.0, 0.02))
+    effects: dict[str, dict[str, Figure]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name, parameters in self.effects.items():
+            known = effect_kind(name).parameters
+            for parameter in parameters:
+                if parameter not in known:
+                    valid = one_of(known, parameter)
+                    raise InputError("drive", f"effects.{name}", parameter, valid)
+
+
+@dataclass(frozen=True)
+class DriveFile:
+    """`drive.yaml`: drives by joint name of the MJCF; `*` for all that are not named."""
+
+    schema: int
+    joints: dict[str, JointDrive]
+
+    def __post_init__(self) -> None:
+        if self.schema != SCHEMA:
+            raise InputError("drive", "schema", self.schema, f"{SCHEMA}")
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """Rigid bodies and drives.
+
+    Attributes:
+        model: MuJoCo model whose actuators are not used; a free root is welded.
+        drives: by joint name.
+        classes: joints by class name (`flexion`, `abduction`, a finger, …).
+        hand: the hand file, if the mechanism is the hand.
+    """
+
+    model: Any
+    drives: Mapping[str, JointDrive]
+    classes: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    hand: HandFile | None = None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints in the order of the model."""
+        return tuple(self.drives)
+
+
+def mjcf_mechanism(mjcf: str | Path, drive: str | Path) -> Mechanism:
+    """Makes the mechanism of a user: an MJCF file and `drive.yaml`.
+
+    Raises:
+        InputError: a file that cannot be read, a joint that is in one of them only.
+    """
+    try:
+        model = mujoco.MjModel.from_xml_path(str(mjcf))
+    except (ValueError, OSError) as error:
+        raise InputError(mjcf, "", error, "an MJCF file") from error
+    return model_mechanism(model, load_yaml(DriveFile, drive).joints, mjcf)
+
+
+def model_mechanism(
+    model: Any, drives: Mapping[str, JointDrive], source: object = "mechanism"
+) -> Mechanism:
+    """Makes a mechanism of a compiled model and drives by joint name or `*`.
+
+    Raises:
+        InputError: a drive of a joint that is not in the model, or no joint at all.
+    """
+    simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
+    names = [model.joint(i).name for i in range(model.njnt)]
+    movable = [n for n in names if model.joint(n).type[0] in simple]
+    for name in drives:
+        if name != "*" and name not in movable:
+            raise InputError(source, "joints", name, one_of(movable, name))
+    chosen = {n: drives.get(n, drives.get("*")) for n in movable}
+    kept = {name: drive for name, drive in chosen.items() if drive is not None}
+    if not kept:
+        raise InputError(source, "joints", ", ".join(drives), "a drive for a joint")
+    return Mechanism(model, kept)
+
+
+def hand_mechanism(hand: HandFile | None = None) -> Mechanism:
+    """Makes the mechanism of the hand on a stand: the palm does not move.
+
+    The command path of the hand file (delay, low-pass, speed limit) and its torque
+    limit are effects that the simulation has.
+    """
+    hand = hand or load_hand_file()
+    spec = build_spec(hand)
+    for joint in spec.joints:
+        if joint.type == mujoco.mjtJoint.mjJNT_FREE:
+            spec.delete(joint)
+    model = spec.compile()
+    drives = {
+        link.joint: _hand_drive(hand, index)
+        for index, link in enumerate(figures().links)
+    }
+    return Mechanism(model, drives, _hand_classes(), hand)
+
+
+def _hand_drive(hand: HandFile, index: int) -> JointDrive:
+    """Drive of one joint of the hand."""
+    link = figures().links[index]
+    limit = link.force_limit * hand.torque_scale.per_joint()[index]
+    return JointDrive(
+        kp=Figure(link.kp * hand.stiffness_scale.per_joint()[index]),
+        kd=Figure(link.kv * hand.damping_scale.per_joint()[index], 0.1),
+        effects={
+            "transport_delay": {"delay_s": Figure(hand.delay_s.value)},
+            "lowpass_cutoff": {"cutoff_hz": Figure(hand.lowpass_hz.value)},
+            "slew_limit": {
+                "speed_rad_s": Figure(float(hand.speed_limit.per_joint()[index]))
+            },
+            "torque_limit": {"limit_nm": Figure(float(limit))},
+        },
+    )
+
+
+def _hand_classes() -> dict[str, tuple[str, ...]]:
+    """Joints of the hand by kind and by finger; joint 2 of a finger abducts."""
+    names = figures().joint_names
+    by_number = {
+        i: tuple(n for n in names if n.endswith(f"joint{i}")) for i in range(5)
+    }
+    classes = {
+        "flexion": tuple(n for n in names if not n.endswith("joint2")),
+        "abduction": by_number[2],
+        "pip": by_number[3],
+        "dip": by_number[4],
+    }
+    for index, finger in enumerate(FINGERS):
+        classes[finger] = names[4 * index : 4 * index + 4]
+    return classes
