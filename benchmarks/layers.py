@@ -7,7 +7,6 @@ import jax.numpy as jnp
 from bare import Layer, bare_cpu, bare_warp
 
 from envs.batch import BatchEnv
-from envs.randomize import model_fields
 
 ACTION_STD = 0.3
 
@@ -27,17 +26,16 @@ def through_jax(batch: BatchEnv, repeat: int) -> Layer:
     worlds = jax.jit(batch.reset)(jax.random.key(0))
     ctrl = jnp.tile(jnp.array(env.stance.target_rad), (env.physics.n_substeps, 1))
 
-    def one(variation: Any, data: Any) -> Any:
-        fields = model_fields(env.mj_model, env.spec, variation)
-        return env.physics.step(fields, data, ctrl).state
+    def one(lasting: Any, data: Any) -> Any:
+        return env.physics.step(env.fields(lasting), data, ctrl).state
 
     @jax.jit
-    def many(variation: Any, data: Any) -> Any:
+    def many(lasting: Any, data: Any) -> Any:
         step = jax.vmap(one)
-        return jax.lax.fori_loop(0, repeat, lambda _, d: step(variation, d), data)
+        return jax.lax.fori_loop(0, repeat, lambda _, d: step(lasting, d), data)
 
-    variation = worlds.memory.lasting.variation
-    return Layer(lambda: jax.block_until_ready(many(variation, worlds.data)), repeat)
+    lasting = worlds.memory.lasting
+    return Layer(lambda: jax.block_until_ready(many(lasting, worlds.data)), repeat)
 
 
 def environment(batch: BatchEnv, repeat: int) -> Layer:

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from envs.errors import check_ordered
+from envs.observations import InputTerm
 from envs.streams import stream
 
 
@@ -45,3 +46,9 @@ def sample_command(key: Array, config: CommandConfig) -> Float[Array, "3"]:
     command = jax.random.uniform(stream(key, "command"), (3,), minval=low, maxval=high)
     stand = jax.random.bernoulli(stream(key, "standing"), config.standing_fraction)
     return jnp.where(stand, 0.0, command)
+
+
+def command_term(config: CommandConfig) -> InputTerm:
+    """The command as inputs of a policy."""
+    ranges = (config.vel_x_mps, config.vel_y_mps, config.yaw_rate_rps)
+    return InputTerm("command", 3, "V", "m/s m/s rad/s", ranges)

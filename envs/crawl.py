@@ -1,6 +1,5 @@
 """The crawl task: follow planar velocity and yaw-rate commands on five fingertips."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +12,8 @@ from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.hand_env import HandEnv
-from envs.memory import Memory
+from envs.hand_task import BareTask
+from envs.memory import Lasting, Memory
 from envs.physics import PhysicsState
 from envs.plant import Plant, check_interval
 from envs.randomize import RandomizeConfig
@@ -80,7 +80,7 @@ class CrawlConfig:
 
 
 @dataclass(frozen=True)
-class Crawl:
+class Crawl(BareTask):
     """The crawl task as `envs.hand_task.HandTask`.
 
     Attributes:
@@ -96,22 +96,22 @@ class Crawl:
         """No footprint yet: it is captured in the first step and then kept (paper)."""
         return {"footprint": init_footprint_memory()}
 
-    def begin_episode(self, key: Array) -> dict[str, Any]:
+    def begin_episode(
+        self, key: Array, lasting: Lasting, state: PhysicsState
+    ) -> dict[str, Any]:
         """A first command and a fresh lift memory."""
+        del lasting, state
         command = sample_command(key, self.config.command)
         return {"command": command, "lift": init_lift_memory()}
 
     def start(
-        self, key: Array, plant: Plant
+        self, key: Array, plant: Plant, lasting: Lasting
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """The stance with noise, at a random heading (ours), under its targets."""
+        del lasting
         joint_rad, speed_mps = self.config.reset_joint_rad, self.config.reset_speed_mps
         state = near_stance(key, plant, joint_rad, speed_mps)
         return state, jnp.array(plant.stance.target_rad)
-
-    def inputs(self, carried: Mapping[str, Any]) -> Float[Array, "3"]:
-        """The command: v_x, v_y [m/s] and yaw rate [rad/s]."""
-        return carried["command"]
 
     def magnitudes(
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
@@ -145,8 +145,9 @@ class Crawl:
         fallen = jnp.any(jnp.abs(signals.tilt_rad) > limits)
         return fallen | (signals.palm_contact > 0)
 
-    def advance(self, memory: Memory) -> Memory:
+    def advance(self, memory: Memory, signals: Signals) -> Memory:
         """Draws the next command when its time has come, and resets the lift memory."""
+        del signals
         config = self.config
         period = round(config.command.resample_s / config.control_dt_s)
         due = memory.steps % period == 0

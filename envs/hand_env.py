@@ -1,25 +1,32 @@
 """One world of the hand under a task: reset, step and what happens between them."""
 
+from collections.abc import Mapping
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import mujoco
-import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from envs.base import State
 from envs.hand.drive import init_drive_state
 from envs.hand.hand_file import HandFile, load_hand_file
-from envs.hand.model import PHYSICS_DT_S, build_model
+from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec
 from envs.hand.stance import Stance, stance_of
 from envs.hand_task import HandTask
 from envs.memory import Lasting, Memory
-from envs.observations import Sample, flatten, push, start_history
-from envs.physics import Physics, PhysicsOutput, PhysicsState, make_physics
+from envs.observations import InputTerm, Sample, flatten, push, start_history
+from envs.physics import (
+    ModelFields,
+    Physics,
+    PhysicsOutput,
+    PhysicsState,
+    make_physics,
+)
 from envs.plant import make_plant
-from envs.randomize import draw_variation
+from envs.randomize import draw_variation, model_fields
+from envs.scene import build_scene
 from envs.scoring import scheduled_weights, score
 from envs.sensing import sense
 from envs.signals import Command, Signals, extract_signals
@@ -49,17 +56,15 @@ class HandEnv:
         self.task, self.config = task, task.config
         self.hand = hand or load_hand_file()
         self.stance = stance or stance_of(self.hand)
-        model = build_model(self.hand, np.array(self.stance.q_off))
         physics = make_physics(
             backend,
-            model,
+            self.build_scene().compile(),
             round(self.dt / PHYSICS_DT_S),
             num_worlds,
             contacts_per_world=self.config.contacts_per_world,
             constraints_per_world=self.config.constraints_per_world,
         )
         self.plant = make_plant(physics, self.hand, self.stance)
-        self._q_off = jnp.array(self.stance.q_off)
         first = jax.eval_shape(self.reset, jax.random.key(0))
         self._observation_size = {k: x.shape[-1] for k, x in first.obs.items()}
 
@@ -67,6 +72,11 @@ class HandEnv:
     def table(self) -> RewardTable:
         """Rows of the reward."""
         return self.task.table
+
+    @property
+    def input_terms(self) -> tuple[InputTerm, ...]:
+        """The task's inputs to the policy, in their order."""
+        return self.task.input_terms
 
     @property
     def mj_model(self) -> mujoco.MjModel:
@@ -103,6 +113,15 @@ class HandEnv:
         """Sizes of the actor's and the critic's observation."""
         return dict(self._observation_size)
 
+    def build_scene(self) -> mujoco.MjSpec:
+        """The scene as a specification."""
+        return build_scene(self.hand, self.stance.q_off, self.task.add_scene)
+
+    def fields(self, lasting: Lasting) -> ModelFields:
+        """All model fields in which a world differs from `mj_model`."""
+        fields = model_fields(self.mj_model, self.spec, lasting.variation)
+        return self.task.vary_scene(self.plant, fields, lasting)
+
     def reset(self, key: Array) -> State:
         """Begins a new world: its draw of the randomization and its first episode."""
         config = self.config
@@ -135,10 +154,9 @@ class HandEnv:
         action = jnp.clip(action, -config.action_clip, config.action_clip)
         target = self.plant.next_target(memory.target, action, config.action_scale_rad)
         drive, output, invalid = self.plant.step(
-            memory.lasting.variation, state.data, memory.drive, target
+            self.fields(memory.lasting), state.data, memory.drive, target
         )
-        asked = Command(self.task.inputs(vars(memory)), action, memory.action)
-        signals = self._signals(state.data, output, asked, self.dt)
+        signals = self.signals(state.data, output, action, vars(memory))
         memory = memory.replace(
             drive=drive, target=target, action=action, steps=memory.steps + 1
         )
@@ -154,15 +172,15 @@ class HandEnv:
     ) -> State:
         """Rewards, ends and observes a step whose physics is done."""
         memory, extras = self.task.magnitudes(memory, signals, ~invalid)
-        named = vars(signals) | extras
+        named = vars(signals) | signals.extra | extras
         lasting, reward, terms = score(
             self.table, memory.lasting, named, self.dt, ~invalid
         )
         terminated = self.task.terminated(signals) & ~invalid
         timeout = memory.steps >= self.episode_length
         truncated = timeout & ~terminated & ~invalid
-        memory = self.task.advance(memory.replace(lasting=lasting))
-        sample = self._sample(lasting, output.state, memory.action, vars(memory))
+        memory = self.task.advance(memory.replace(lasting=lasting), signals)
+        sample = self.sample(output.state, vars(memory))
         memory = memory.replace(history=push(memory.history, sample))
         info = {
             "truncation": truncated.astype(jnp.float32),
@@ -172,7 +190,7 @@ class HandEnv:
         }
         return State(
             data=output.state,
-            obs=_observations(memory.history, output.state, signals),
+            obs=self._observations(output.state, signals, vars(memory)),
             reward=reward,
             done=(terminated | timeout | invalid).astype(jnp.float32),
             metrics=self._metrics(terms, signals, output),
@@ -184,26 +202,24 @@ class HandEnv:
     def _start(self, lasting: Lasting) -> State:
         """First state of an episode."""
         key = jax.random.fold_in(stream(lasting.key, "episode"), lasting.episodes)
-        data, target = self.task.start(key, self.plant)
+        data, target = self.task.start(key, self.plant, lasting)
         action, zero = jnp.zeros(self.action_size), jnp.zeros(())
-        carried = self.task.begin_episode(key)
+        carried = self.task.begin_episode(key, lasting, data) | {
+            "lasting": lasting,
+            "steps": jnp.zeros((), jnp.int32),
+            "drive": init_drive_state(target, self.plant.drive, PHYSICS_DT_S),
+            "target": target,
+            "action": action,
+        }
         output = self.plant.rest.replace(state=data)
-        asked = Command(self.task.inputs(carried), action, action)
-        signals = self._signals(data, output, asked, 1.0)
-        memory = Memory(
-            lasting=lasting,
-            steps=jnp.zeros((), jnp.int32),
-            drive=init_drive_state(target, self.plant.drive, PHYSICS_DT_S),
-            target=target,
-            action=action,
-            history=start_history(self._sample(lasting, data, action, carried)),
-            **carried,
-        )
+        signals = self.signals(data, output, action, carried)
+        history = start_history(self.sample(data, carried))
+        memory = Memory(**carried, history=history)
         names = ("truncation", "invalid", "episode_return", "episode_length")
         terms = {row.name: zero for row in self.table}
         return State(
             data=data,
-            obs=_observations(memory.history, data, signals),
+            obs=self._observations(data, signals, vars(memory)),
             reward=zero,
             done=zero,
             metrics=self._metrics(terms, signals, output),
@@ -212,22 +228,47 @@ class HandEnv:
             memory=memory,
         )
 
-    def _signals(
-        self, before: PhysicsState, output: PhysicsOutput, asked: Command, dt_s: float
-    ) -> Signals:
-        return extract_signals(self.spec, self._q_off, before, output, asked, dt_s)
-
-    def _sample(
+    def signals(
         self,
-        lasting: Lasting,
-        data: PhysicsState,
+        before: PhysicsState,
+        output: PhysicsOutput,
         action: Float[Array, "20"],
-        carried: dict[str, Any],
-    ) -> Sample:
-        """What the actor is told, relative to the settled stance."""
-        reference, inputs = jnp.array(self.stance.joint_pos_rad), self.task.inputs
-        noise = self.config.randomize
-        return sense(noise, lasting, reference, data, action, inputs(carried))
+        carried: Mapping[str, Any],
+    ) -> Signals:
+        """All signals of a control step.
+
+        Args:
+            before: the state before.
+            output: result of the physics.
+            action: clipped policy output of this step.
+            carried: fields of the `Memory` before the step.
+        """
+        asked = Command(carried["command"], action, carried["action"])
+        q_off = jnp.array(self.stance.q_off)
+        signals = extract_signals(self.spec, q_off, before, output, asked, self.dt)
+        extra = self.task.scene_signals(self.plant, carried, signals, output)
+        return signals.replace(extra=extra)
+
+    def sample(self, data: PhysicsState, carried: Mapping[str, Any]) -> Sample:
+        """What the actor is told, relative to the settled stance.
+
+        Args:
+            data: the state that is measured.
+            carried: fields of the `Memory` after the step.
+        """
+        reference, noise = jnp.array(self.stance.joint_pos_rad), self.config.randomize
+        told = sense(noise, carried["lasting"], reference, data, carried["action"])
+        return told.replace(inputs=self.task.inputs(carried, told))
+
+    def _observations(
+        self, data: PhysicsState, signals: Signals, carried: Mapping[str, Any]
+    ) -> dict[str, Array]:
+        """The actor's inputs; the critic adds base state, torque and tip force."""
+        actor = flatten(carried["history"], self.input_terms)
+        base = [data.qpos[2:3], signals.vel_v, signals.angvel_v, signals.gravity_b]
+        extra = [*base, signals.torque_nm, signals.tip_force_n]
+        extra.append(self.task.privileged(carried, signals))
+        return {"state": actor, "privileged_state": jnp.concatenate([actor, *extra])}
 
     def _metrics(
         self, terms: dict[str, Array], signals: Signals, output: PhysicsOutput
@@ -236,13 +277,3 @@ class HandEnv:
         named = {f"reward/{name}": value for name, value in terms.items()}
         overflow = (output.overflow != 0).astype(jnp.float32)
         return named | self.task.measures(signals) | {"contact_overflow": overflow}
-
-
-def _observations(
-    history: Sample, data: PhysicsState, signals: Signals
-) -> dict[str, Array]:
-    """The actor's inputs; the critic adds base state, torque and tip force."""
-    actor = flatten(history)
-    base = [data.qpos[2:3], signals.vel_v, signals.angvel_v, signals.gravity_b]
-    extra = [*base, signals.torque_nm, signals.tip_force_n]
-    return {"state": actor, "privileged_state": jnp.concatenate([actor, *extra])}

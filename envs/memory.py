@@ -22,6 +22,7 @@ class Lasting:
         total_steps: control steps of all episodes, which the curricula follow.
         episodes: episodes begun before this one.
         footprint: `rewards.FootprintMemory` of tasks that have it, captured once.
+        task: what else the task keeps of the world, a pytree of its own.
     """
 
     key: Array
@@ -30,6 +31,7 @@ class Lasting:
     total_steps: Int[Array, "*b"]
     episodes: Int[Array, "*b"]
     footprint: Any = None
+    task: Any = None
 
 
 @flax.struct.dataclass
@@ -45,6 +47,7 @@ class Memory:
         history: the last eight samples of the observation.
         command: v_x, v_y [m/s] and yaw rate [rad/s] of the coming step.
         lift: `rewards.LiftMemory` of tasks that have it.
+        task: what else the task carries, a pytree of its own.
     """
 
     lasting: Lasting
@@ -55,3 +58,4 @@ class Memory:
     history: Sample
     command: Float[Array, "*b 3"]
     lift: Any = None
+    task: Any = None

@@ -1,12 +1,35 @@
-"""The actor's observation: five terms, eight samples each, oldest to newest."""
+"""The actor's observation: terms with eight samples each, oldest to newest."""
+
+from dataclasses import dataclass, field
 
 import flax.struct
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 HISTORY = 8
-TERMS = ("joint_pos", "gravity", "angvel", "action", "command")
-"""Order of the terms; each term's whole history comes before the next term's."""
+TERMS = ("joint_pos", "gravity", "angvel", "action")
+"""Order of the terms of every task; those of the task's inputs come after them."""
+
+
+@dataclass(frozen=True)
+class InputTerm:
+    """One term of a task's inputs.
+
+    Attributes:
+        name: key in `Sample.inputs`, and name in the manifest of a policy.
+        size: entries of one sample.
+        frame: frame in which they are expressed.
+        unit: their unit.
+        ranges: lowest and highest value of each entry in training, for a term that an
+            operator gives; empty for one that is measured.
+    """
+
+    name: str
+    size: int
+    frame: str
+    unit: str
+    ranges: tuple[tuple[float, float], ...] = field(default=())
 
 
 @flax.struct.dataclass
@@ -18,32 +41,30 @@ class Sample:
         gravity: unit vector of gravity in the palm frame, as the IMU tells it.
         angvel: angular velocity in the palm frame [rad/s], as the IMU tells it.
         action: previous clipped policy output a_t.
-        command: the task's inputs; crawling: v_x, v_y [m/s] and yaw rate [rad/s].
+        inputs: the task's inputs by name of their term.
     """
 
     joint_pos: Float[Array, "*t 20"]
     gravity: Float[Array, "*t 3"]
     angvel: Float[Array, "*t 3"]
     action: Float[Array, "*t 20"]
-    command: Float[Array, "*t inputs"]
+    inputs: dict[str, Float[Array, "*t n"]] = flax.struct.field(default_factory=dict)
 
 
 def start_history(sample: Sample) -> Sample:
     """History at an episode's start: the first sample, eight times."""
-    return Sample(**{k: jnp.tile(x, (HISTORY, 1)) for k, x in vars(sample).items()})
+    return jax.tree.map(lambda x: jnp.tile(x, (HISTORY, 1)), sample)
 
 
 def push(history: Sample, sample: Sample) -> Sample:
     """Drops the oldest sample and appends a new one."""
-    newest = vars(sample)
-    return Sample(
-        **{
-            k: jnp.concatenate([x[1:], newest[k][None]])
-            for k, x in vars(history).items()
-        }
+    return jax.tree.map(
+        lambda kept, newest: jnp.concatenate([kept[1:], newest[None]]), history, sample
     )
 
 
-def flatten(history: Sample) -> Float[Array, " n"]:
-    """The observation vector, [8 × joint_pos, 8 × gravity, …, 8 × command]."""
-    return jnp.concatenate([getattr(history, name).reshape(-1) for name in TERMS])
+def flatten(history: Sample, input_terms: tuple[InputTerm, ...]) -> Float[Array, " n"]:
+    """The observation vector, [8 × joint_pos, 8 × gravity, …, 8 × last input term]."""
+    common = [getattr(history, name) for name in TERMS]
+    inputs = [history.inputs[term.name] for term in input_terms]
+    return jnp.concatenate([x.reshape(-1) for x in (*common, *inputs)])

@@ -13,10 +13,9 @@ from envs.hand.drive import DriveParams, DriveState, command_sequence, drive_par
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.spec import HandSpec, hand_spec
+from envs.hand.spec import HAND_NQ, HandSpec, hand_spec
 from envs.hand.stance import Stance
-from envs.physics import Physics, PhysicsOutput, PhysicsState
-from envs.randomize import Variation, model_fields
+from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
 
 
 @dataclass(frozen=True)
@@ -62,12 +61,18 @@ class Plant:
 
     def step(
         self,
-        variation: Variation,
+        fields: ModelFields,
         state: PhysicsState,
         drive: DriveState,
         target: Float[Array, "20"],
     ) -> tuple[DriveState, PhysicsOutput, Bool[Array, ""]]:
         """Advances one control step with the joint targets held.
+
+        Args:
+            fields: what the model of this world differs in.
+            state: the state before.
+            drive: the drive's state before.
+            target: joint targets [rad].
 
         Returns:
             The drive's state, the result, and whether the step was invalid; see
@@ -76,7 +81,6 @@ class Plant:
         drive, commands = command_sequence(
             self.drive, drive, target, PHYSICS_DT_S, self.physics.n_substeps
         )
-        fields = model_fields(self.mj_model, self.spec, variation)
         output = self.physics.step(fields, state, commands)
         return drive, *self.replace_invalid(output)
 
@@ -128,9 +132,9 @@ def check_interval(control_dt_s: float) -> None:
 
 
 def _output_at_rest(model: mujoco.MjModel, stance: Stance) -> PhysicsOutput:
-    """The settled stance with the sensors that belong to it."""
+    """The settled stance, the rest of the scene as built, and their sensors."""
     data = mujoco.MjData(model)
-    data.qpos[:], data.ctrl[:] = stance.qpos, stance.target_rad
+    data.qpos[:HAND_NQ], data.ctrl[:] = stance.qpos, stance.target_rad
     mujoco.mj_forward(model, data)
     vectors = (data.qpos, np.zeros(model.nv), np.zeros(model.nv), data.sensordata)
     *state, sensordata = (jnp.asarray(x, jnp.float32) for x in vectors)

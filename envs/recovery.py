@@ -1,6 +1,5 @@
 """Fall recovery: get up from the thumb side or the wrist side into the crawl stance."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -13,7 +12,8 @@ from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.hand_env import HandEnv
 from envs.hand_settings import HandSettings
-from envs.memory import Memory
+from envs.hand_task import BareTask
+from envs.memory import Lasting, Memory
 from envs.physics import PhysicsState
 from envs.plant import Plant
 from envs.recovery_falls import Falls, falls_of
@@ -53,7 +53,7 @@ class RecoveryConfig(HandSettings):
 
 
 @dataclass(frozen=True)
-class Recovery:
+class Recovery(BareTask):
     """Fall recovery as `envs.hand_task.HandTask`.
 
     Attributes:
@@ -73,12 +73,15 @@ class Recovery:
         """Nothing outlives an episode."""
         return {}
 
-    def begin_episode(self, key: Array) -> dict[str, Any]:
+    def begin_episode(
+        self, key: Array, lasting: Lasting, state: PhysicsState
+    ) -> dict[str, Any]:
         """The command of the whole episode."""
+        del lasting, state
         return {"command": sample_command(key, self.config.command)}
 
     def start(
-        self, key: Array, plant: Plant
+        self, key: Array, plant: Plant, lasting: Lasting
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """One of the fallen poses at rest, at a random heading, under its targets."""
         count = len(self.falls.side)
@@ -91,10 +94,6 @@ class Recovery:
         qpos = jnp.concatenate([pose[:3], quat_w, pose[7:]])
         rest = jnp.zeros(plant.mj_model.nv)
         return PhysicsState(qpos, rest, rest), jnp.array(self.falls.target_rad)[fall]
-
-    def inputs(self, carried: Mapping[str, Any]) -> Float[Array, "3"]:
-        """The command: v_x, v_y [m/s] and yaw rate [rad/s]."""
-        return carried["command"]
 
     def magnitudes(
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
@@ -113,8 +112,9 @@ class Recovery:
         del signals
         return jnp.zeros((), bool)
 
-    def advance(self, memory: Memory) -> Memory:
+    def advance(self, memory: Memory, signals: Signals) -> Memory:
         """Nothing changes within an episode."""
+        del signals
         return memory
 
     def measures(self, signals: Signals) -> dict[str, Float[Array, ""]]:

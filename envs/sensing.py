@@ -3,6 +3,7 @@
 import jax
 from jaxtyping import Array, Float
 
+from envs.hand.spec import JOINT_QPOS
 from envs.memory import Lasting
 from envs.observations import Sample
 from envs.physics import PhysicsState
@@ -19,9 +20,8 @@ def sense(
     reference_rad: Float[Array, "20"],
     data: PhysicsState,
     action: Float[Array, "20"],
-    inputs: Float[Array, " inputs"],
 ) -> Sample:
-    """What the actor is told of one control step.
+    """What the actor is told of one control step, but for the task's inputs.
 
     Args:
         config: bounds of the noise.
@@ -29,7 +29,6 @@ def sense(
         reference_rad: joint angles that read as zero [rad].
         data: the state that is measured.
         action: last clipped policy output.
-        inputs: inputs of the task, which carry no noise here.
     """
     variation = lasting.variation
     key = jax.random.fold_in(stream(lasting.key, "noise"), lasting.total_steps)
@@ -40,7 +39,7 @@ def sense(
         return value + bound * noise
 
     imu = from_vector(variation.imu_rotation_rad)
-    joints = data.qpos[7:] - reference_rad
+    joints = data.qpos[JOINT_QPOS] - reference_rad
     down = noisy("gravity", gravity(data.qpos[3:7]), config.gravity_noise)
     angvel = data.qvel[3:6] + variation.gyro_bias_rps
     return Sample(
@@ -48,5 +47,4 @@ def sense(
         gravity=rotate(imu, down / safe_norm(down)),
         angvel=noisy("gyro", rotate(imu, angvel), config.gyro_noise_rps),
         action=action,
-        command=inputs,
     )

@@ -11,7 +11,14 @@ from jaxtyping import Array, Float
 
 from envs.hand.figures import figures
 from envs.hand.model import PALM, PAYLOAD, V_SITE
-from envs.hand.spec import OTHER_LINKS, TIP_SITES, TIP_SPHERES, HandSpec
+from envs.hand.spec import (
+    JOINT_QPOS,
+    JOINT_QVEL,
+    OTHER_LINKS,
+    TIP_SITES,
+    TIP_SPHERES,
+    HandSpec,
+)
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.rotations import multiply, rotate, unrotate
 
@@ -43,6 +50,7 @@ class Signals:
         command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
         action: clipped policy output of this step.
         previous_action: clipped policy output of the step before.
+        extra: the task's own signals by name, see `envs.hand_task.HandTask`.
     """
 
     joint_pos: Float[Array, "*b 20"]
@@ -66,6 +74,7 @@ class Signals:
     command: Float[Array, "*b 3"]
     action: Float[Array, "*b 20"]
     previous_action: Float[Array, "*b 20"]
+    extra: dict[str, Array] = flax.struct.field(default_factory=dict)
 
 
 @flax.struct.dataclass
@@ -107,11 +116,11 @@ def extract_signals(
     """
     state, sensors = output.state, output.sensordata
     quat_w, angvel_b = state.qpos[3:7], state.qvel[3:6]
-    v_quat_w = multiply(quat_w, q_off)
+    v_quat_w, joint_vel = multiply(quat_w, q_off), state.qvel[JOINT_QVEL]
     return Signals(
-        joint_pos=state.qpos[7:],
-        joint_vel=state.qvel[6:],
-        joint_acc=(state.qvel[6:] - before.qvel[6:]) / dt_s,
+        joint_pos=state.qpos[JOINT_QPOS],
+        joint_vel=joint_vel,
+        joint_acc=(joint_vel - before.qvel[JOINT_QVEL]) / dt_s,
         torque_nm=_stack(spec, sensors, "torque", figures().joint_names)[:, 0],
         palm_pos_w=state.qpos[:3],
         palm_quat_w=quat_w,

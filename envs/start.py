@@ -4,6 +4,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array
 
+from envs.hand.spec import HAND_NQ, JOINT_QPOS
 from envs.physics import PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply
@@ -13,7 +14,7 @@ from envs.streams import stream
 def near_stance(
     key: Array, plant: Plant, joint_rad: float, speed_mps: float
 ) -> PhysicsState:
-    """The settled stance with noise, at a random heading.
+    """The settled stance with noise, at a random heading; bodies of the task as built.
 
     Args:
         key: of the episode.
@@ -25,7 +26,7 @@ def near_stance(
     heading = about_z(
         jax.random.uniform(stream(key, "heading"), (), minval=-jnp.pi, maxval=jnp.pi)
     )
-    joints = pose[7:] + jax.random.uniform(
+    joints = pose[JOINT_QPOS] + jax.random.uniform(
         stream(key, "joints"), (20,), minval=-joint_rad, maxval=joint_rad
     )
     vel = jax.random.uniform(
@@ -36,6 +37,7 @@ def near_stance(
             pose[:3],
             multiply(heading, pose[3:7]),
             jnp.clip(joints, limits[:, 0], limits[:, 1]),
+            pose[HAND_NQ:],
         ]
     )
     qvel = jnp.zeros(plant.mj_model.nv).at[:3].set(vel)

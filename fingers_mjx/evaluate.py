@@ -1,6 +1,6 @@
 """Evaluation: many randomized episodes of one policy, measured one by one."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
 from typing import Protocol
@@ -17,6 +17,7 @@ from fingers_mjx.measures import steps_alive
 REPORT_EVERY = 50
 Policy = Callable[[dict[str, Array]], Float[Array, "B actions"]]
 Progress = Callable[[int, int], None]
+TaskMeasures = Callable[[Mapping[str, Array], Array], dict[str, Array]]
 
 
 class BatchEnv(Protocol):
@@ -65,6 +66,7 @@ def evaluate(
     key: Array,
     mass_kg: float = MASS_KG,
     progress: Progress | None = None,
+    task_measures: TaskMeasures | None = None,
 ) -> EpisodeTable:
     """Runs a policy and measures each episode up to its first `done`.
 
@@ -81,6 +83,7 @@ def evaluate(
         key: of the resets; the same key gives the same episodes.
         mass_kg: of the hand and what it carries, for the cost of transport.
         progress: called with (steps done, steps in all) from time to time.
+        task_measures: see `episode_table`.
 
     Raises:
         InputError: `episodes` or `steps` is below one.
@@ -96,20 +99,33 @@ def evaluate(
         tell = _telling(progress, count // len(state.done) * steps, batches * steps)
         rollouts.append(_rollout(advance, state, steps, tell))
     traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :episodes], *rollouts)
-    return episode_table(traces, float(batch_env.dt), mass_kg)
+    return episode_table(traces, float(batch_env.dt), mass_kg, task_measures)
 
 
-def episode_table(traces: Trace, dt_s: float, mass_kg: float) -> EpisodeTable:
+def episode_table(
+    traces: Trace,
+    dt_s: float,
+    mass_kg: float,
+    task_measures: TaskMeasures | None = None,
+) -> EpisodeTable:
     """Measures recorded episodes.
 
     Args:
         traces: NumPy arrays, axes time and episode first.
         dt_s: control interval.
         mass_kg: of the hand and what it carries.
+        task_measures: of one episode, from the fields of its trace by name and the
+            steps that count; added to those that every task has.
     """
     found = _measures(traces, dt_s, mass_kg)
+    if task_measures is not None:
+        found = found | jax.vmap(partial(_task_measures, task_measures), 1)(traces)
     columns = {name: np.asarray(values, float) for name, values in found.items()}
     return EpisodeTable(columns, traces, dt_s)
+
+
+def _task_measures(measure: TaskMeasures, trace: Trace) -> dict[str, Array]:
+    return measure(vars(trace) | trace.extra, steps_alive(trace.done, trace.failed))
 
 
 def _advance(env: BatchEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:

@@ -32,6 +32,7 @@ class Trace:
         done: the episode ended in this step.
         failed: it ended for another reason than the time limit.
         overflow: the physics ran out of room for contacts and dropped some.
+        extra: the task's own signals by name.
     """
 
     command: Float[Array, "*t 3"]
@@ -48,6 +49,7 @@ class Trace:
     done: Bool[Array, "*t"]
     failed: Bool[Array, "*t"]
     overflow: Bool[Array, "*t"]
+    extra: dict[str, Array] = flax.struct.field(default_factory=dict)
 
 
 def record(state: State) -> Trace:
@@ -70,6 +72,7 @@ def record(state: State) -> Trace:
         done=done,
         failed=done & (state.info["truncation"] == 0),
         overflow=state.metrics.get("contact_overflow", jnp.zeros_like(power)) > 0,
+        extra=signals.extra,
     )
 
 

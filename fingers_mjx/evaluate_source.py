@@ -9,6 +9,7 @@ import jax
 import numpy as np
 from matplotlib.figure import Figure
 
+from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.randomize import no_randomization
 from fingers_mjx import figures
@@ -46,7 +47,13 @@ def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     Args:
         setup: settings.
         command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
+
+    Raises:
+        InputError: the task has no commands.
     """
+    if not hasattr(setup.env, "command"):
+        valid = "no --command: this task has none"
+        raise InputError("--command", "", setup.train.task, valid)
     ranges = [(float(value), float(value)) for value in command]
     fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
     fixed = dict(zip(fields, ranges, strict=True))
@@ -89,9 +96,15 @@ def evaluate_source(
         episodes,
         batch.episode_length,
         jax.random.key(seed),
-        float(batch.mj_model.body_mass.sum()),
+        hand_mass_kg(batch),
         progress,
+        batch.task.episode_measures,
     )
+
+
+def hand_mass_kg(batch: BatchEnv) -> float:
+    """Returns the mass of the hand and what it carries, without the task's bodies."""
+    return float(batch.mj_model.body_subtreemass[batch.spec.palm_body])
 
 
 def document(

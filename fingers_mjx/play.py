@@ -23,12 +23,9 @@ from envs.batch import BatchEnv
 from envs.hand.drive import DriveState, command_sequence
 from envs.hand.figures import figures
 from envs.hand.model import PHYSICS_DT_S
-from envs.memory import Memory
+from envs.memory import Lasting, Memory
 from envs.observations import Sample
 from envs.physics import PhysicsOutput, PhysicsState
-from envs.randomize import Variation, model_fields
-from envs.sensing import sense
-from envs.signals import Command, extract_signals
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluate_record import Trace, record
@@ -81,7 +78,7 @@ class Player:
             schedule: a command for each step; drawn as in training if not given.
         """
         start = self._reset(key)
-        model = varied_model(self.env, start.memory.lasting.variation)
+        model = varied_model(self.env, start.memory.lasting)
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
         memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
@@ -115,15 +112,11 @@ class Player:
             np.asarray(told.joint_pos) + reference,
             np.asarray(told.gravity),
             np.asarray(told.angvel),
-            np.asarray(told.command),
+            np.concatenate([told.inputs[term.name] for term in self.env.input_terms]),
         )
 
     def _reading(self, memory: Memory, state: PhysicsState) -> Sample:
-        env = self.env
-        reference = jnp.array(env.stance.joint_pos_rad)
-        inputs = env.task.inputs(vars(memory))
-        noise = env.config.randomize
-        return sense(noise, memory.lasting, reference, state, memory.action, inputs)
+        return self.env.sample(state, vars(memory))
 
     def _commands(
         self, drive: DriveState, target: Float[Array, "20"]
@@ -142,9 +135,7 @@ class Player:
     ) -> tuple[Memory, Trace]:
         """Returns the memory for the next step and this step's part of the trace."""
         env = self.env
-        asked = Command(env.task.inputs(vars(memory)), action, memory.action)
-        q_off = jnp.array(env.stance.q_off)
-        signals = extract_signals(env.spec, q_off, before, output, asked, env.dt)
+        signals = env.signals(before, output, action, vars(memory))
         finite = jnp.all(jnp.isfinite(output.state.qpos))
         done = (env.task.terminated(signals) | ~finite).astype(jnp.float32)
         row = record(_judged_state(signals, done))
@@ -155,19 +146,18 @@ class Player:
             action=action,
             steps=memory.steps + 1,
         )
-        return env.task.advance(after), row
+        return env.task.advance(after, signals), row
 
 
-def varied_model(env: BatchEnv, variation: Variation) -> mujoco.MjModel:
+def varied_model(env: BatchEnv, lasting: Lasting) -> mujoco.MjModel:
     """Returns the model of a world for C MuJoCo, which stops where it diverges.
 
     Args:
         env: of the nominal model.
-        variation: the world's draw.
+        lasting: the world.
     """
     model = copy.copy(env.mj_model)
-    fields = model_fields(env.mj_model, env.spec, variation)
-    for name, value in fields.items():
+    for name, value in env.fields(lasting).items():
         getattr(model, name)[:] = np.asarray(value)
     # The compiler notes where a body's inertial frame is the body's own; no more.
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE

@@ -8,6 +8,7 @@ import numpy as np
 
 from fingers_mjx.evaluate import EpisodeTable, Progress, episode_table
 from fingers_mjx.evaluate_record import Trace
+from fingers_mjx.evaluate_source import hand_mass_kg
 from fingers_mjx.play import Played, Player, Schedule
 
 
@@ -55,8 +56,9 @@ def play_episodes(
             progress(index + 1, episodes)
     traces = [_padded(one.trace, steps) for one in played]
     joined = jax.tree.map(lambda *x: np.stack(x, axis=1), *traces)
-    mass_kg = float(player.env.mj_model.body_mass.sum())
-    table = episode_table(joined, player.env.dt, mass_kg)
+    env = player.env
+    measures = env.task.episode_measures
+    table = episode_table(joined, env.dt, hand_mass_kg(env), measures)
     return Session(table, played[0], sum(one.held for one in played))
 
 

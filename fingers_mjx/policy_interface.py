@@ -8,7 +8,7 @@ from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
-from envs.observations import HISTORY, TERMS
+from envs.observations import HISTORY, TERMS, InputTerm
 from fingers_deploy.manifest import (
     Action,
     CommandPath,
@@ -21,12 +21,11 @@ TOLERANCE = 1e-6
 """Largest difference between numbers that count as the same (settling rounds)."""
 
 # Name in the manifest, entries, frame and unit of each term of `envs.observations`.
-_TERMS: Mapping[str, tuple[str, int, str, str]] = {
-    "joint_pos": ("joint_pos", 20, "joint", "rad"),
-    "gravity": ("gravity_b", 3, "palm", "1"),
-    "angvel": ("angvel_b", 3, "palm", "rad/s"),
-    "action": ("previous_action", 20, "joint", "1"),
-    "command": ("command", 3, "V", "m/s m/s rad/s"),
+_TERMS: Mapping[str, InputTerm] = {
+    "joint_pos": InputTerm("joint_pos", 20, "joint", "rad"),
+    "gravity": InputTerm("gravity_b", 3, "palm", "1"),
+    "angvel": InputTerm("angvel_b", 3, "palm", "rad/s"),
+    "action": InputTerm("previous_action", 20, "joint", "1"),
 }
 
 
@@ -34,8 +33,8 @@ def interface_of(env: BatchEnv) -> Interface:
     """Returns the interface of a policy trained in `env`."""
     stance, config = env.stance, env.config
     limits = env.spec.joint_range_rad.tolist()
-    terms = tuple(_term(name) for name in TERMS)
-    command = config.command
+    inputs = env.input_terms
+    terms = tuple(_term(term) for term in (*(_TERMS[name] for name in TERMS), *inputs))
     return Interface(
         joint_names=figures().joint_names,
         reference_angles_rad=stance.joint_pos_rad,
@@ -45,11 +44,7 @@ def interface_of(env: BatchEnv) -> Interface:
         observation=Observation(terms),
         action=Action(scale_rad=config.action_scale_rad, clip=config.action_clip),
         command_path=_command_path(env.hand),
-        command_ranges=(
-            command.vel_x_mps,
-            command.vel_y_mps,
-            command.yaw_rate_rps,
-        ),
+        command_ranges=tuple(pair for term in inputs for pair in term.ranges),
         v_quat_b=stance.q_off,
     )
 
@@ -86,9 +81,9 @@ def check_same(source: object, found: Mapping[str, Any], ours: Any) -> None:
             raise InputError(source, field, value, valid)
 
 
-def _term(name: str) -> Term:
-    manifest_name, size, frame, unit = _TERMS[name]
-    return Term(manifest_name, size, frame, unit, scale=1.0, history=HISTORY)
+def _term(term: InputTerm) -> Term:
+    name, size, frame, unit = term.name, term.size, term.frame, term.unit
+    return Term(name, size, frame, unit, scale=1.0, history=HISTORY)
 
 
 def _command_path(hand: HandFile) -> CommandPath:

@@ -10,13 +10,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from envs.batch import BatchEnv
 from envs.config import load_yaml, override
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
-from envs.hand.model import build_spec
 from envs.registry import get_task, make_batch
 from fingers_mjx.policy_interface import check_same, interface_of
 from fingers_mjx.ppo_config import TrainConfig
@@ -112,11 +109,11 @@ def make_env(
 def identity(env: BatchEnv) -> dict[str, Any]:
     """Returns what a resumed run must share besides its settings.
 
-    The hash of the model is that of its MJCF, which holds all of hand and stance that
+    The hash of the model is that of its MJCF, which holds all of hand and scene that
     physics sees; the drive's delay and filter are in the hand's own. The interface is
     also what an evaluation or export of the run must share.
     """
-    spec = build_spec(env.hand, np.array(env.stance.q_off))
+    spec = env.build_scene()
     spec.compile()
     return {
         "hand_sha256": env.hand.sha256,

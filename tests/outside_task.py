@@ -1,6 +1,6 @@
 """A task from outside the packages: the hand crouches at half its stance's height.
 
-A configuration, the methods of `envs.hand_task.HandTask`, and one call of `register`.
+A configuration, methods of `envs.hand_task.HandTask`, and one call of `register`.
 """
 
 from dataclasses import dataclass, field
@@ -10,6 +10,7 @@ import jax.numpy as jnp
 from envs.commands import CommandConfig
 from envs.hand_env import HandEnv
 from envs.hand_settings import HandSettings
+from envs.hand_task import BareTask
 from envs.registry import Task, register
 from envs.start import near_stance
 from rewards import RewardTerm, action_rate, stance_height
@@ -27,21 +28,18 @@ class CrouchConfig(HandSettings):
 
 
 @dataclass(frozen=True)
-class Crouch:
+class Crouch(BareTask):
     config: CrouchConfig
     table: tuple = CROUCH
 
     def begin_world(self):
         return {}
 
-    def begin_episode(self, key):
+    def begin_episode(self, key, lasting, state):
         return {"command": jnp.zeros(3)}
 
-    def start(self, key, plant):
+    def start(self, key, plant, lasting):
         return near_stance(key, plant, 0.05, 0.0), jnp.array(plant.stance.target_rad)
-
-    def inputs(self, carried):
-        return carried["command"]
 
     def magnitudes(self, memory, signals, valid):
         wanted_m = jnp.array(self.config.height_m)
@@ -50,7 +48,7 @@ class Crouch:
     def terminated(self, signals):
         return signals.palm_contact > 0
 
-    def advance(self, memory):
+    def advance(self, memory, signals):
         return memory
 
     def measures(self, signals):

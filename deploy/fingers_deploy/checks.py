@@ -16,14 +16,19 @@ from fingers_deploy.manifest import (
     Term,
 )
 
-# Source, size, frame and unit of every term that can be put together here. None: free,
-# because the caller supplies the command as the manifest describes it.
+# Size, frame and unit of every term that can be put together here. None: free, because
+# the caller supplies the command as the manifest describes it.
 TERM_FRAMES: dict[str, tuple[int | None, str | None, str | None]] = {
     "joint_pos": (JOINT_COUNT, "joint", "rad"),
     "gravity_b": (3, "palm", "1"),
     "angvel_b": (3, "palm", "rad/s"),
     "previous_action": (JOINT_COUNT, "joint", "1"),
     "command": (None, None, None),
+    "request": (4, None, "1"),
+    "fingertip_pos": (3, "V", "m"),
+    "object_pos": (3, "V", "m"),
+    "object_vel": (3, "V", "m/s"),
+    "object_to_target": (3, "V", "m"),
 }
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _VERSION = re.compile(r"[A-Za-z0-9.+_-]{1,64}")

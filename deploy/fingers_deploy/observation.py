@@ -11,6 +11,16 @@ Sample: TypeAlias = tuple[NDArray[np.float32], ...]
 History: TypeAlias = tuple[NDArray[np.float32], ...]
 
 
+COMMON_TERMS = ("joint_pos", "gravity_b", "angvel_b", "previous_action")
+"""Terms of every task; all others are its inputs."""
+
+
+def input_size(interface: Interface) -> int:
+    """Number of task inputs of one control step, the sum over their terms."""
+    terms = interface.observation.terms
+    return sum(term.size for term in terms if term.name not in COMMON_TERMS)
+
+
 class ObservationAssembler:
     """Turns one sample per control step into the observation vector.
 
@@ -24,6 +34,9 @@ class ObservationAssembler:
 
     def __init__(self, interface: Interface):
         self._terms = interface.observation.terms
+        inputs = [term for term in self._terms if term.name not in COMMON_TERMS]
+        self._input_names = [term.name for term in inputs]
+        self._input_ends = np.cumsum([term.size for term in inputs])
         self._reference = np.asarray(interface.reference_angles_rad, np.float32)
 
     def sample(
@@ -41,8 +54,8 @@ class ObservationAssembler:
             gravity_b: unit vector of gravity (points down) in the palm frame, [3].
             angvel_b: angular velocity of the palm in the palm frame [rad/s], [3].
             previous_action: clipped policy output of the step before, [20].
-            command: task inputs as the manifest describes them, e.g. v_x, v_y [m/s] and
-                yaw rate [rad/s] in V, [3].
+            command: all task inputs one after another as the manifest's terms
+                describe them, e.g. v_x, v_y [m/s] and yaw rate [rad/s] in V, [3].
 
         Raises:
             ValueError: an argument of another shape.
@@ -52,7 +65,7 @@ class ObservationAssembler:
             "gravity_b": np.asarray(gravity_b, np.float32),
             "angvel_b": np.asarray(angvel_b, np.float32),
             "previous_action": np.asarray(previous_action, np.float32),
-            "command": np.asarray(command, np.float32),
+            **self._split(np.asarray(command, np.float32)),
         }
         for term in self._terms:
             shape = values[term.name].shape
@@ -62,6 +75,15 @@ class ObservationAssembler:
                 )
         values["joint_pos"] = values["joint_pos"] - self._reference
         return tuple(values[t.name] * np.float32(t.scale) for t in self._terms)
+
+    def _split(self, inputs: NDArray[np.float32]) -> dict[str, NDArray[np.float32]]:
+        """Returns each term's part of the task inputs."""
+        size = self._input_ends[-1] if self._input_names else 0
+        if inputs.shape != (size,):
+            named = " + ".join(self._input_names) or "command"
+            raise ValueError(f"{named}: found shape {inputs.shape}; valid: ({size},)")
+        parts = np.split(inputs, self._input_ends[:-1])
+        return dict(zip(self._input_names, parts, strict=False))
 
     def update(self, history: History | None, sample: Sample) -> History:
         """Returns the history with `sample` as its newest entry, [history, size] each.

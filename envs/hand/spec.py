@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.errors import InputError
 from envs.hand.figures import FINGERS, figures
 from envs.hand.model import PALM, PAYLOAD
 
@@ -15,6 +16,10 @@ TIP_SPHERES = tuple(f"{link}_tip" for link in TIP_LINKS)
 OTHER_LINKS = tuple(
     link.body for link in figures().links if link.capsule and not link.tip
 )
+HAND_NQ, HAND_NV = 27, 26
+"""Positions and velocities of the hand, which come first in every scene."""
+JOINT_QPOS, JOINT_QVEL = slice(7, HAND_NQ), slice(6, HAND_NV)
+"""Where its joints stand in them, after the free root."""
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,18 @@ class HandSpec:
 
 
 def hand_spec(model: mujoco.MjModel) -> HandSpec:
-    """Resolves all names in a model built by `envs.hand.model`."""
+    """Resolves all names in a model of the hand, alone or first in a scene.
+
+    Raises:
+        InputError: the joints of the hand are not the first ones of the model.
+    """
+    names = figures().joint_names
+    joints = [model.joint(name).id for name in names]
+    found = (model.jnt_qposadr[joints], model.jnt_dofadr[joints])
+    wanted = (np.arange(HAND_NQ)[JOINT_QPOS], np.arange(HAND_NV)[JOINT_QVEL])
+    if not all(np.array_equal(a, b) for a, b in zip(found, wanted, strict=True)):
+        valid = "the hand first, bodies of the task after it"
+        raise InputError("scene", "joints", found[0].tolist(), valid)
     ends = model.sensor_adr + model.sensor_dim
     return HandSpec(
         sensors={
@@ -50,5 +66,5 @@ def hand_spec(model: mujoco.MjModel) -> HandSpec:
         palm_body=model.body(PALM).id,
         payload_body=model.body(PAYLOAD).id,
         tip_geoms=tuple(model.geom(name).id for name in TIP_SPHERES + TIP_LINKS),
-        joint_range_rad=model.jnt_range[model.jnt_type != mujoco.mjtJoint.mjJNT_FREE],
+        joint_range_rad=model.jnt_range[joints],
     )

@@ -104,7 +104,7 @@ def test_a_new_command_resets_the_lift_memory(crawl, steps, due):
     memory = crawl.roll(crawl.first, crawl.actions(5))[-1].memory
     one = jax.tree.map(lambda x: x[0], memory).replace(steps=jnp.int32(steps))
     assert any(np.asarray(x).any() for x in jax.tree.leaves(one.lift))
-    after = Crawl(CrawlConfig()).advance(one)
+    after = Crawl(CrawlConfig()).advance(one, None)
     assert (after.command != one.command).any() == due
     kept = any(np.asarray(x).any() for x in jax.tree.leaves(after.lift))
     assert kept != due

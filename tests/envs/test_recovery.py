@@ -105,7 +105,7 @@ def test_starts_draw_every_fall_at_every_heading(recovery):
     env = recovery.batch.env
     print("seed 20260122")
     keys = jax.random.split(jax.random.key(20260122), 600)
-    states, targets = jax.vmap(lambda key: env.task.start(key, env.plant))(keys)
+    states, targets = jax.vmap(lambda key: env.task.start(key, env.plant, None))(keys)
     joints = np.asarray(env.task.falls.qpos, np.float32)[:, 7:]
     drawn = np.abs(states.qpos[:, None, 7:] - joints).max(axis=2).argmin(axis=1)
     assert len(np.unique(drawn)) == len(joints)

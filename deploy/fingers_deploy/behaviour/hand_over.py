@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.manifest import Interface
-from fingers_deploy.observation import History, ObservationAssembler
+from fingers_deploy.observation import History, ObservationAssembler, input_size
 
 Array = NDArray[np.float32]
 
@@ -72,7 +72,7 @@ def build_history(
     """
     history: History | None = None
     action = np.zeros(len(interface.joint_names), np.float32)
-    size = len(interface.command_ranges)
+    size = input_size(interface)
     for moment in moments:
         sample = assembler.sample(
             moment.joint_pos,

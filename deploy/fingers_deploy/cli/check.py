@@ -10,6 +10,7 @@ import numpy as np
 
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
+from fingers_deploy.observation import input_size
 from fingers_deploy.policy import Runtime
 
 STEPS = 2000
@@ -90,10 +91,7 @@ def _time(bundle: Bundle, runtime: Runtime, allowed_s: float) -> float:
     """
     controller = PolicyController(bundle, runtime)
     interface = bundle.manifest.interface
-    pose, command = (
-        interface.reference_angles_rad,
-        [c[0] for c in interface.command_ranges],
-    )
+    pose, command = interface.reference_angles_rad, np.zeros(input_size(interface))
     took = np.empty(STEPS)
     for i in range(STEPS):
         start = time.thread_time()
