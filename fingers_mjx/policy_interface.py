@@ -74,7 +74,7 @@ def check_same(source: object, found: Mapping[str, Any], ours: Any) -> None:
     Raises:
         InputError: naming the first field that differs.
     """
-    wanted = dict(_leaves(ours, "interface"))
+    wanted = dict(_leaves(_one_speed(ours, found), "interface"))
     for field, value in _leaves(dict(found), "interface"):
         if not _same(value, wanted.get(field, "nothing")):
             valid = f"{wanted.get(field, 'nothing')}, as the environment has"
@@ -87,12 +87,22 @@ def _term(term: InputTerm) -> Term:
 
 
 def _command_path(hand: HandFile) -> CommandPath:
-    """Returns the drive's path; of the joints' speed limits, the lowest."""
+    """Returns the drive's path."""
     return CommandPath(
         delay_s=hand.delay_s.value,
         lowpass_hz=hand.lowpass_hz.value,
-        slew_rad_s=float(hand.speed_limit.per_joint().min()),
+        slew_rad_s=tuple(hand.speed_limit.per_joint().tolist()),
     )
+
+
+def _one_speed(ours: Any, found: Mapping[str, Any]) -> Any:
+    """Returns ours as earlier exports stated it: one speed limit, the lowest."""
+    stated = found.get("command_path", {}).get("slew_rad_s")
+    if not isinstance(stated, float):
+        return ours
+    path = ours["command_path"]
+    lowest = {**path, "slew_rad_s": min(path["slew_rad_s"])}
+    return {**ours, "command_path": lowest}
 
 
 def _leaves(value: Any, field: str) -> Iterator[tuple[str, Any]]:

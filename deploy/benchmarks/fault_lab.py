@@ -175,7 +175,7 @@ class Lab:
             interface.joint_names,
             chain.delay_s,
             chain.lowpass_hz,
-            chain.slew_rad_s or 2.8,
+            chain.slews_rad_s,
             seed,
         )
         self.driver = LabDriver(hand, bundles[0], self.clock)

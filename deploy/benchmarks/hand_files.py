@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+import fingers_mjx
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
@@ -28,6 +29,8 @@ from fingers_deploy.manifest import (
 from fingers_mjx.bundle import encode_bundle, write_bundle
 from fingers_mjx.onnx_graph import PolicyWeights
 
+WALKING = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
+"""The committed policy."""
 HISTORY = 8
 PERIOD_STEPS = 15
 CLIP = 0.35  # small steps, so that the hand stands
@@ -50,6 +53,10 @@ def write_model(path: Path) -> Path:
     return path
 
 
+def _joint_speeds() -> tuple[float, ...]:
+    return tuple(load_hand_file().speed_limit.per_joint().tolist())
+
+
 def hand_interface() -> Interface:
     """The crawl interface of the calibrated hand."""
     stance = load_stance()
@@ -62,7 +69,7 @@ def hand_interface() -> Interface:
         control_rate_hz=50.0,
         observation=Observation(TERMS),
         action=Action(scale_rad=0.06, clip=CLIP),
-        command_path=CommandPath(delay_s=0.02, lowpass_hz=3.0, slew_rad_s=2.8),
+        command_path=CommandPath(0.02, 3.0, _joint_speeds()),
         command_ranges=((0.0, 0.16), (-0.16, 0.16), (-0.45, 0.45)),
         v_quat_b=stance.q_off,
     )

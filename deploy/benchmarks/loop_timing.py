@@ -1,8 +1,10 @@
-"""L1 to L4: the real loop in real time against a simulated hand in another process.
+"""L1 to L5: the real loop in real time against a simulated hand in another process.
 
-    python deploy/benchmarks/loop_timing.py --minutes 10 --load 4 [--no-realtime]
+    python deploy/benchmarks/loop_timing.py --minutes 10 --load 2 [--no-realtime]
 
-`--load` starts that many busy processes; they end with the measurement.
+`--load` starts that many busy processes; they end with the measurement. The policy is
+the committed one; the hand walks all the time, and is armed again after a stop. Steps
+that were missed while the host had put the whole machine aside are told apart.
 """
 
 import argparse
@@ -12,16 +14,25 @@ import os
 import sys
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 from fault_processes import plain_options
-from hand_files import marching_bundle, write_model
+from hand_files import WALKING, write_model
+from witness import Pauses, witnesses
 
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.drivers.sim import SimulatorProcess
 from fingers_deploy.record import read_log
 from fingers_deploy.runtime.launcher import Launcher
-from fingers_mjx.bundle import write_bundle
+from fingers_deploy.runtime.realtime import resident_mb
+from fingers_deploy.runtime.stats import LATE_S
+from fingers_deploy.safety import Mode
+
+SAMPLE_S, CONTROL_S = 10.0, 0.02
+REACTION_S = 0.3  # a stop comes so long after the pause that it answers
+_NEXT = {"disabled": "arm", "stopping": "stop", "safe": "clear"}
 
 
 def _busy() -> None:
@@ -31,10 +42,53 @@ def _busy() -> None:
         block[:] = bytes(len(block))
 
 
-def stolen_s() -> float:
-    """Time that a hypervisor took from this machine's processors so far [s]."""
-    steal = int(Path("/proc/stat").read_text().split()[8])
-    return steal / os.sysconf("SC_CLK_TCK")
+def processor_s() -> tuple[float, float]:
+    """Time of all processors so far [s]: busy, and taken away by the host."""
+    user, nice, system, _, _, irq, soft, steal = map(
+        int, Path("/proc/stat").read_text().split()[1:9]
+    )
+    per_s = os.sysconf("SC_CLK_TCK")
+    return (user + nice + system + irq + soft + steal) / per_s, steal / per_s
+
+
+class Memory:
+    """Resident memory of both processes over time."""
+
+    def __init__(self, launcher: Launcher):
+        self._processes = launcher.supervisor, launcher.policy
+        self._next_s, self.samples = 0.0, []
+
+    def sample(self) -> None:
+        """Takes a sample from time to time."""
+        t = time.monotonic()
+        if t >= self._next_s:
+            self._next_s = t + SAMPLE_S
+            each = [resident_mb(process.pid) for process in self._processes]
+            self.samples.append((t, *each))
+
+    def summary(self) -> dict:
+        """Largest size, and growth per hour by a straight line; the start left out."""
+        table = np.array(self.samples[len(self.samples) // 10 :])
+        hours = (table[:, 0] - table[0, 0]) / 3600
+        fits = [np.polyfit(hours, table[:, k], 1)[0] for k in (1, 2)]
+        return {
+            "memory_mb": [round(x, 1) for x in table[:, 1:].max(axis=0).tolist()],
+            "growth_mb_per_h": [round(float(x), 2) for x in fits],
+        }
+
+
+def operate(launcher: Launcher, seconds: float, each: Callable[[], None]) -> None:
+    """Arms, and arms again after every stop; at the end quits."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and launcher.poll(0.2):
+        each()
+        word = _NEXT.get(launcher.status.get("mode", ""))
+        if word:
+            launcher.send(word)
+    launcher.send("quit")
+    while launcher.poll(0.05):
+        pass
+    launcher.finish()
 
 
 def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
@@ -47,39 +101,75 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     ):
         options = plain_options(bundle, simulator.path, out, realtime=realtime)
         launcher = Launcher(options, lines.append)
-        memory: list[float] = []
-        end, stolen = time.monotonic() + seconds, stolen_s()
-        while time.monotonic() < end and launcher.poll(0.2):
-            mode = launcher.status.get("mode")
-            memory.append(launcher.status.get("memory_mb", 0.0))
-            if mode == "disabled":
-                launcher.send("arm")
-            elif mode == "stopping":
-                launcher.send("stop")
-            elif mode == "safe":
-                launcher.send("clear")
-        launcher.send("quit")
-        while launcher.poll(0.05):
-            pass
-        launcher.finish()
-        rows = [read_log(file).rows for file in sorted(Path(out).glob("*.mcap"))]
-    trips = [line for line in lines if line.startswith("active -> ")]
-    active = sum(int((part["mode"] == 2).sum()) for part in rows)
+        memory = Memory(launcher)
+        begin, before = time.monotonic(), processor_s()
+        with witnesses() as pauses:
+            operate(launcher, seconds, memory.sample)
+        took, after = time.monotonic() - begin, processor_s()
+        files = sorted(Path(out).glob("*.mcap"))
+        largest = max(file.stat().st_size for file in files)
+        recorded = [_recorded(file, pauses) for file in files]
+    status, timing = launcher.status, launcher.status["timing"]
+    missed = timing["late_over_5ms"] + timing["skipped"]
+    asked = timing["control_steps"] + timing["skipped"]
+    # The last one is the operator's.
+    stops = sum(line.startswith("active -> ") for line in lines) - 1
     return {
-        "stolen_s": round(stolen_s() - stolen, 2),
-        "scheduler": launcher.status["realtime"],
-        **launcher.status["timing"],
-        "memory_mb": [round(memory[len(memory) // 10], 2), round(memory[-1], 2)],
-        "steps_with_policy": active,
-        "stops": max(len(trips) - 1, 0),
+        "minutes": round(took / 60, 1),
+        "busy_cores": round((after[0] - before[0]) / took, 2),
+        "stolen_s": round(after[1] - before[1], 2),
+        "scheduler": status["realtime"],
+        "missed_percent": round(100 * missed / asked, 4),
+        "missed": missed,
+        "of_these_in_a_pause": sum(row["in_a_pause"] for row in recorded),
+        "pauses": len(pauses.found),
+        "longest_pause_ms": round(
+            1e3 * max((b - a for a, b in pauses.found), default=0.0), 1
+        ),
+        "late_percent_of_gaps": round(
+            100 * timing["gaps_over_4ms"] / timing["loop_steps"], 4
+        ),
+        **timing,
+        **memory.summary(),
+        "files": len(files),
+        "largest_file_mb": round(largest / 1e6, 1),
+        "steps_with_policy": sum(row["walked"] for row in recorded),
+        "worst_skipped_in_a_row": max(row["in_a_row"] for row in recorded),
+        "stops": max(stops, 0),
+        "stops_after_a_pause": sum(row["stops_in_a_pause"] for row in recorded),
         "why": sorted({line.split(":")[0] for line in lines if " -> hold" in line}),
+        "warned": any(line.startswith("NOT ON TIME") for line in lines),
+    }
+
+
+def _recorded(file: Path, pauses: Pauses) -> dict[str, int]:
+    """Counts of one file: steps with the policy, missed in a row, in a pause, stops."""
+    log = read_log(file)
+    rows, start = log.rows, float(log.metadata["start_unix_s"])
+    walked = int((rows["mode"] == Mode.ACTIVE).sum())
+    total = rows["skipped"].astype(np.int64)
+    skipped = np.diff(total, prepend=total[:1])
+    late = rows["late_s"] > LATE_S
+    excused = 0
+    for k in np.flatnonzero(late | (skipped > 0)):
+        t = float(rows["unix_s"][k])
+        begin = t - float(rows["late_s"][k]) - CONTROL_S * int(skipped[k])
+        if pauses.during(begin, t):
+            excused += int(late[k]) + int(skipped[k])
+    worst = int(skipped.max()) if len(skipped) else 0
+    stops = [start + t for t, line in log.events if line.startswith("active -> ")]
+    return {
+        "walked": walked,
+        "in_a_row": worst,
+        "in_a_pause": excused,
+        "stops_in_a_pause": sum(pauses.during(t - REACTION_S, t) for t in stops),
     }
 
 
 def main() -> int:
     """Runs the measurement and prints it as JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bundle", type=Path)
+    parser.add_argument("--bundle", type=Path, default=WALKING)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--load", type=int, default=0)
     parser.add_argument("--no-realtime", action="store_true")
@@ -89,15 +179,14 @@ def main() -> int:
     ]
     for process in load:
         process.start()
-    with tempfile.TemporaryDirectory() as folder:
-        model = write_model(Path(folder) / "hand.xml")
-        bundle = options.bundle or Path(folder) / "march"
-        if not options.bundle:
-            write_bundle(bundle, marching_bundle())
-        seconds = 60 * options.minutes
-        result = measure(bundle, model, seconds, not options.no_realtime)
-    for process in load:
-        process.kill()
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            model = write_model(Path(folder) / "hand.xml")
+            seconds = 60 * options.minutes
+            result = measure(options.bundle, model, seconds, not options.no_realtime)
+    finally:
+        for process in load:
+            process.kill()
     print(json.dumps({"load": options.load, **result}, indent=1))
     return 0
 

@@ -169,11 +169,15 @@ def _check_rates(interface: Interface, problem: _Problems) -> None:
         "action.scale_rad": action.scale_rad,
         "action.clip": action.clip,
         "command_path.lowpass_hz": path.lowpass_hz,
-        "command_path.slew_rad_s": path.slew_rad_s,
     }
     for field, value in positive.items():
         holds = value is None or value > 0
         problem.unless(holds, f"interface.{field}", value, "above zero")
+    slews = path.slews_rad_s
+    problem.length("interface.command_path.slew_rad_s", len(slews), JOINT_COUNT)
+    for i, slew in enumerate(slews):
+        field = f"interface.command_path.slew_rad_s[{i}]"
+        problem.unless(slew > 0, field, slew, "above zero")
     delay, transform = path.delay_s, action.transform
     problem.unless(delay >= 0, "interface.command_path.delay_s", delay, "0 or more")
     field = "interface.action.transform"

@@ -43,7 +43,7 @@ def decode(kind: Any, value: Any, source: object, path: str) -> Any:
 
     Args:
         kind: str, int, float, a dataclass of such fields, a tuple, a dict with str
-            keys, or one of these or None.
+            keys, or a choice of a tuple, another one of these, and None.
         value: what `load_json` returned.
         source: name of the file, for messages.
         path: the field inside the file, for messages.
@@ -55,7 +55,7 @@ def decode(kind: Any, value: Any, source: object, path: str) -> Any:
     if dataclasses.is_dataclass(kind):
         return _record(typing.cast(type, kind), value, source, path)
     if origin is types.UnionType:
-        return None if value is None else decode(args[0], value, source, path)
+        return _choice(args, value, source, path)
     if origin is tuple:
         return _sequence(args, value, source, path)
     if origin is dict:
@@ -69,6 +69,16 @@ def nearest(names: Iterable[str], found: str) -> str:
     near = difflib.get_close_matches(found, listed, n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     return "one of " + ", ".join(listed) + hint
+
+
+def _choice(kinds: tuple[Any, ...], value: Any, source: object, path: str) -> Any:
+    """Decodes a list as the tuple among the kinds, anything else as the other one."""
+    if value is None:
+        return None
+    listed = [kind for kind in kinds if typing.get_origin(kind) is tuple]
+    others = [kind for kind in kinds if kind not in (*listed, types.NoneType)]
+    chosen = listed if listed and isinstance(value, list) else others or listed
+    return decode(chosen[0], value, source, path)
 
 
 def _record(cls: type, value: Any, source: object, path: str) -> Any:

@@ -7,6 +7,7 @@ states what must hold between fields.
 
 import dataclasses
 import json
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -94,12 +95,21 @@ class CommandPath:
     Attributes:
         delay_s: transport delay [s].
         lowpass_hz: cutoff of the command low-pass [Hz], null without one.
-        slew_rad_s: limit on the rate of the command [rad/s], null without one.
+        slew_rad_s: limit on the rate of each joint's command [rad/s], null without one;
+            one number, in bundles of earlier exports, is the lowest of the joints.
     """
 
     delay_s: float
     lowpass_hz: float | None
-    slew_rad_s: float | None
+    slew_rad_s: tuple[float, ...] | float | None
+
+    @property
+    def slews_rad_s(self) -> tuple[float, ...]:
+        """Limit of each joint [rad/s], infinity without one, [20]."""
+        if isinstance(self.slew_rad_s, tuple):
+            return self.slew_rad_s
+        limit = math.inf if self.slew_rad_s is None else self.slew_rad_s
+        return (limit,) * JOINT_COUNT
 
 
 @dataclass(frozen=True)

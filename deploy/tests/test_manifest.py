@@ -154,6 +154,10 @@ MALFORMED = [
     ((I, "command_path", "delay_s"), -0.1),
     ((I, "command_path", "lowpass_hz"), 0),
     ((I, "command_path", "slew_rad_s"), -1),
+    ((I, "command_path", "slew_rad_s"), "fast"),
+    ((I, "command_path", "slew_rad_s"), [2.8] * 19),
+    ((I, "command_path", "slew_rad_s"), [2.8] * 19 + [0.0]),
+    ((I, "command_path", "slew_rad_s"), [2.8] * 19 + [None]),
     ((I, "command_ranges"), [[0, 1]]),
     ((I, "command_ranges", 0), [1, 0]),
     ((I, "v_quat_b"), [1.0, 1.0, 0.0, 0.0]),
@@ -216,6 +220,15 @@ def test_optional_fields_may_be_null(table, bundle):
     read: Manifest = parse_manifest(edited, "manifest.json")
     assert read.provenance.evaluation is None
     assert read.interface == bundle.manifest.interface
+
+
+def test_a_speed_limit_may_be_one_number_one_per_joint_or_none(table):
+    field = (I, "command_path", "slew_rad_s")
+    each = [2.8] * 12 + [2.5] * 8
+    for value, wanted in ((2.5, [2.5] * 20), (each, each), (None, [np.inf] * 20)):
+        read = parse_manifest(_edit(table, field, value), "manifest.json")
+        assert list(read.interface.command_path.slews_rad_s) == wanted
+        assert parse_manifest(dump_manifest(read), "again") == read
 
 
 @pytest.mark.parametrize("bad", [float("nan"), float("inf"), -float("inf")])

@@ -74,9 +74,14 @@ def _describe(bundle: Bundle) -> None:
     )
     print(
         f"trained with    delay {1e3 * chain.delay_s:g} ms, low-pass "
-        f"{chain.lowpass_hz} Hz, slew {chain.slew_rad_s} rad/s"
+        f"{chain.lowpass_hz} Hz, joint speed {_speeds(chain.slews_rad_s)}"
     )
     print(f"joints          {', '.join(interface.joint_names)}")
+
+
+def _speeds(limits_rad_s: tuple[float, ...]) -> str:
+    different = sorted(set(limits_rad_s), reverse=True)
+    return " or ".join(f"{limit:g}" for limit in different) + " rad/s"
 
 
 def _ranges(ranges: tuple[tuple[float, float], ...]) -> str:

@@ -150,7 +150,7 @@ class SimulatorProcess:
             f"--joints={','.join(interface.joint_names)}",
             f"--delay-s={chain.delay_s}",
             f"--lowpass-hz={chain.lowpass_hz or 1e6}",
-            f"--slew-rad-s={chain.slew_rad_s or 2.8}",
+            f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
             f"--seed={seed}",
             f"--lifetime-s={lifetime_s}",
         ]

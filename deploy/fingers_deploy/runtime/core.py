@@ -80,7 +80,9 @@ class Core:
         self._interface, self._now = interface, now
         self._limits, self._policy = limits, 0
         self._per_control = steps_per_control
-        self._start_s = self._last_s = now()
+        self._period_s = 1.0 / (interface.control_rate_hz * steps_per_control)
+        self._start_s = now()
+        self._last_s: float | None = None
         self.state = initial_state(limits[0], self._start_s, wiggle)
         self.stats = LoopStats()
         self.checks: tuple[Check, ...] = ()
@@ -104,7 +106,8 @@ class Core:
             operator: what the operator asked since the step before.
         """
         t = tick.t_s
-        self.stats.gap.add(t - self._last_s)
+        if self._last_s is not None:
+            self.stats.gap.add(t - self._last_s)
         self._last_s = t
         control, skipped = self._control(tick)
         reading, imu, health, error = self._read()
@@ -126,9 +129,10 @@ class Core:
         self.state, out = step(self.state, inputs, t, self.limits)
         self._apply(out)
         if control >= 0:
-            self.stats.step(tick.late_s, skipped)
+            late_s = self._late(control, tick)
             self._tell(control, inputs, out, t)
-            self._record(control, tick, inputs, t)
+            self._record(control, late_s, inputs, t)
+            self.stats.step(late_s, skipped, late_s + self._now() - t)
         if self._sink is not None:
             for line in out.events:
                 self._sink.event(t, line)
@@ -143,6 +147,15 @@ class Core:
         skipped = number - self._last_control - 1
         self._last_control = number
         return number, skipped
+
+    def _late(self, control: int, tick: Tick) -> float:
+        """How long after its own deadline a control step starts [s].
+
+        Where steps of the loop were skipped, that is more than the tick was late.
+        """
+        return (
+            tick.number - control * self._per_control
+        ) * self._period_s + tick.late_s
 
     def _read(self) -> Sample:
         try:
@@ -199,7 +212,7 @@ class Core:
         self._sent = {control: t}
         self._link.send(packet)
 
-    def _record(self, control: int, tick: Tick, inputs: Inputs, t: float) -> None:
+    def _record(self, control: int, late_s: float, inputs: Inputs, t: float) -> None:
         if self._sink is None:
             return
         row = self._row
@@ -212,7 +225,7 @@ class Core:
         row["supply"] = np.nan if health is None else health.bus_v
         row["enabled"] = health is not None and health.enabled
         row["command"] = self._command
-        row["late_s"], row["skipped"] = tick.late_s, self.stats.skipped
+        row["late_s"], row["skipped"] = late_s, self.stats.skipped
         row["tick"], row["policy"] = control, self._policy
         row["mode"] = self.state.mode
         row["reaction"] = severest(self.state.faults)

@@ -45,6 +45,7 @@ class Launcher:
         self.policy = _start("policy_process", text, policy)
         self.supervisor = _start("supervisor_process", text, supervisor, console)
         self._heard_s = time.monotonic() + START_S
+        self._late = False
         self._notify = os.environ.get("NOTIFY_SOCKET", "")
 
     def send(self, word: str) -> None:
@@ -99,6 +100,12 @@ class Launcher:
         self._heard_s, self.status = time.monotonic(), status
         for line in status["events"]:
             self._say(line)
+        if status["timing_warning"] and not self._late:
+            self._say(
+                "NOT ON TIME: more than 1 % of the control steps of the last 10 s were "
+                f"skipped or late by 5 ms; {status['realtime']}"
+            )
+        self._late = status["timing_warning"]
         if status["alarm"]:
             self._say("CUT THE BATTERY: the hand does not confirm that it is off")
         if self._notify:

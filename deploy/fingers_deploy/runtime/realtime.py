@@ -10,10 +10,10 @@ PRIORITY = 50
 SWITCH_S = 5e-4  # longest time for which a thread keeps the interpreter
 
 
-def resident_mb() -> float:
-    """Memory of this process that is in RAM [MB]; zero where Linux does not tell."""
+def resident_mb(process: int | str = "self") -> float:
+    """Memory of a process that is in RAM [MB]; zero where Linux does not tell."""
     try:
-        with open("/proc/self/statm", encoding="ascii") as file:
+        with open(f"/proc/{process}/statm", encoding="ascii") as file:
             pages = int(file.read().split()[1])
     except OSError:
         return 0.0

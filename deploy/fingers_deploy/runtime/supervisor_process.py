@@ -5,6 +5,7 @@ import socket
 import sys
 import time
 from collections.abc import Mapping, Sequence
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +25,14 @@ from fingers_deploy.safety.machine import ENERGIZED
 from fingers_deploy.safety.types import Operator
 
 STATUS_S = 0.2
+# The speed limit of the joints is the hand's own: nothing here depends on it.
+_SHARED = (
+    "joint_names",
+    "control_rate_hz",
+    "v_quat_b",
+    "command_path.delay_s",
+    "command_path.lowpass_hz",
+)
 
 
 def make_all_limits(
@@ -37,7 +46,7 @@ def make_all_limits(
 
 
 def check_together(bundles: Sequence[Bundle]) -> None:
-    """Refuses policies that cannot be switched between: other joints, other rate.
+    """Refuses policies that cannot be switched between: other joints, rate or filter.
 
     Raises:
         InputError: naming bundle and field.
@@ -45,8 +54,8 @@ def check_together(bundles: Sequence[Bundle]) -> None:
     first = bundles[0].manifest.interface
     for bundle in bundles[1:]:
         other = bundle.manifest.interface
-        for field in ("joint_names", "control_rate_hz", "v_quat_b", "command_path"):
-            found, valid = getattr(other, field), getattr(first, field)
+        for field in _SHARED:
+            found, valid = (attrgetter(field)(x) for x in (other, first))
             if found != valid:
                 where = f"interface.{field}"
                 raise InputError(bundle.source, where, found, f"{valid}, as the first")

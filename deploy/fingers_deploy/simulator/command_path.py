@@ -1,6 +1,7 @@
 """The command path of the hand: delay, firmware low-pass, speed limit; in NumPy."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +21,7 @@ class CommandPath:
         dt_s: physics step [s].
         delay_s: transport delay [s].
         lowpass_hz: cutoff [Hz]; None: no filter.
-        slew_rad_s: speed limit [rad/s]; None: no limit.
+        slew_rad_s: speed limit of each joint, or of all [rad/s]; infinity: no limit.
     """
 
     def __init__(
@@ -29,13 +30,13 @@ class CommandPath:
         dt_s: float,
         delay_s: float,
         lowpass_hz: float | None,
-        slew_rad_s: float | None,
+        slew_rad_s: Sequence[float] | float,
     ):
         self._slots = round(delay_s / dt_s) + 1
         self._gain = 1.0
         if lowpass_hz is not None:
             self._gain = -math.expm1(-2 * math.pi * lowpass_hz * dt_s)
-        self._reach = math.inf if slew_rad_s is None else slew_rad_s * dt_s
+        self._reach = dt_s * np.asarray(slew_rad_s, np.float64)
         self.reset(start_rad)
 
     def reset(self, start_rad: Array) -> None:

@@ -4,6 +4,7 @@ The one module of this package that imports MuJoCo; it runs in the simulator's p
 """
 
 import math
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -34,7 +35,7 @@ class SimulatedHand:
         joint_names: the joints, in the order of every joint vector.
         delay_s: transport delay of the command path [s].
         lowpass_hz: its cutoff [Hz].
-        slew_rad_s: its speed limit [rad/s].
+        slew_rad_s: its speed limit, of each joint or of all [rad/s].
         seed: seed of the sensor noise.
 
     Raises:
@@ -47,7 +48,7 @@ class SimulatedHand:
         joint_names: tuple[str, ...],
         delay_s: float = 0.02,
         lowpass_hz: float | None = 3.0,
-        slew_rad_s: float | None = 2.8,
+        slew_rad_s: Sequence[float] | float = 2.8,
         seed: int = 0,
     ):
         self.model = load_model(Path(model))

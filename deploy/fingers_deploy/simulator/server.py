@@ -121,6 +121,10 @@ def _receive(client: socket.socket) -> np.void | None:
     return np.frombuffer(data, REQUEST)[0]
 
 
+def _numbers(text: str) -> list[float]:
+    return [float(word) for word in text.split(",")]
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Runs the simulator; returns the exit status."""
     parser = argparse.ArgumentParser(prog="fingers-deploy-sim", description=__doc__)
@@ -129,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--joints", required=True, help="joint names, by commas")
     parser.add_argument("--delay-s", type=float, default=0.02)
     parser.add_argument("--lowpass-hz", type=float, default=3.0)
-    parser.add_argument("--slew-rad-s", type=float, default=2.8)
+    parser.add_argument("--slew-rad-s", default="2.8", help="one, or each, by commas")
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--lockstep", action="store_true")
     parser.add_argument("--lifetime-s", type=float, default=86400.0)
@@ -140,7 +144,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             tuple(options.joints.split(",")),
             options.delay_s,
             options.lowpass_hz,
-            options.slew_rad_s,
+            _numbers(options.slew_rad_s),
             options.seed,
         )
     except InputError as error:

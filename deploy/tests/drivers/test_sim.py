@@ -73,14 +73,17 @@ def test_de_energized_joints_hold_by_friction_and_do_not_follow(hand_model, inte
 
 def test_command_path_delays_filters_and_limits():
     zero, one = np.zeros(20), np.ones(20)
-    path = CommandPath(zero, 0.005, 0.02, None, None)
+    path = CommandPath(zero, 0.005, 0.02, None, np.inf)
     assert [path.step(one)[0] for _ in range(6)] == [0, 0, 0, 0, 1, 1]
-    path = CommandPath(zero, 0.001, 0.0, 3.0, None)
+    path = CommandPath(zero, 0.001, 0.0, 3.0, np.inf)
     steps = round(1 / (2 * np.pi * 3.0) / 0.001)
     values = [path.step(one)[0] for _ in range(steps)]
     assert values[-1] == pytest.approx(1 - np.exp(-1), abs=0.005)
     path = CommandPath(zero, 0.005, 0.0, None, 2.0)
     np.testing.assert_allclose(path.step(one), 0.01)
+    each = np.array([2.8, 2.5, 2.8, 2.8] * 5)
+    path = CommandPath(zero, 0.005, 0.0, None, each)
+    np.testing.assert_allclose(path.step(one), 0.005 * each)
 
 
 @pytest.mark.parametrize(

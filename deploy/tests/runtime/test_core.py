@@ -138,6 +138,18 @@ def test_arming_is_refused_with_a_reason_until_everything_is_there(
     assert "lease" in lab.events[-1][1] and lab.mode == Mode.DISABLED
 
 
+def test_a_control_step_counts_from_its_own_deadline(hand_model, marching):
+    """Blocked in the middle of the work: the next tick is on time, the step is not."""
+    lab = Lab(hand_model, (marching,), loop_hz=500)
+    lab.run(0.1)
+    lab.core._sink = Sink()
+    while lab.number % 10 != 9:
+        lab.tick()
+    lab.tick(skip=4)  # 8 ms after the deadline of the control step
+    assert lab.core._sink.rows[-1].view(ROW)["late_s"].item() == pytest.approx(0.008)
+    assert lab.core.stats.summary()["late_over_5ms"] == 1
+
+
 @settings(max_examples=30, deadline=None)
 @given(st.lists(st.integers(0, 12), max_size=40))
 def test_property_control_steps_are_counted_however_ticks_are_missed(skips):

@@ -91,13 +91,14 @@ def test_timing_quantiles_and_counts():
 def test_more_than_one_percent_of_late_steps_warns():
     stats = LoopStats()
     for k in range(1000):
-        stats.step(0.006 if k % 125 == 0 else 0.0, 0)
+        stats.step(0.0, 0, 0.006 if k % 125 == 0 else 0.0)
     assert not stats.warning
     for k in range(500):
-        stats.step(0.006 if k % 50 == 0 else 0.0, 0)
+        stats.step(0.0, 0, 0.006 if k % 50 == 0 else 0.0)
     assert stats.warning
-    stats.step(0.0, 3)
+    stats.step(0.0, 3, 0.0)
     assert stats.summary()["skipped"] == 3
+    assert stats.summary()["late_over_5ms"] == 18
 
 
 def test_link_carries_answers_and_keeps_the_newest():
