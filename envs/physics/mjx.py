@@ -65,6 +65,7 @@ class MjxPhysics:
             valid = f"a model of features in backend {impl}, or the backend cpu"
             raise InputError("model", "", error, valid) from error
         self._model = _without_prints(model) if impl == "warp" else model
+        self._blind = _without_sensors(self._model)
         self._data = jax.tree.map(_uniform_or_array, data)
 
     def step(
@@ -80,20 +81,21 @@ class MjxPhysics:
         """
         if self.impl == "warp":
             _check_batchable(fields)
-        model = self._model.replace(**fields)
+        blind, model = self._blind.replace(**fields), self._model.replace(**fields)
 
         # Warp replays a recorded CUDA graph when it finds its buffers at the addresses
         # it recorded. A scan keeps all substeps in the same buffers; unrolled, each
         # substep would need a graph of its own.
         def substep(data: Any, control: Float[Array, " nu"]) -> tuple[Any, None]:
-            return _mj_step(model, data.replace(ctrl=control)), None
+            return _mj_step(blind, data.replace(ctrl=control)), None
 
         start = jax.tree.map(_array, self._data, is_leaf=_is_uniform).replace(
             qpos=state.qpos,
             qvel=state.qvel,
             qacc_warmstart=state.qacc_warmstart,
         )
-        data, _ = jax.lax.scan(substep, start, ctrl, length=self.n_substeps)
+        data, _ = jax.lax.scan(substep, start, ctrl[:-1], length=self.n_substeps - 1)
+        data = _mj_step(model, data.replace(ctrl=ctrl[-1]))
         after = PhysicsState(data.qpos, data.qvel, data.qacc_warmstart)
         return nan_if_diverged(
             PhysicsOutput(after, data.sensordata, self._overflow(data))
@@ -187,6 +189,12 @@ def _check_batchable(fields: ModelFields) -> None:
         if not batchable.get(name, False):
             valid = "fields that MuJoCo Warp keeps per world, such as body_mass"
             raise InputError("physics fields", name, "a value per world", valid)
+
+
+def _without_sensors(model: Any) -> Any:
+    """Turns off the sensors: only those of the last substep are ever read."""
+    off = model.opt.disableflags | mjx.DisableBit.SENSOR
+    return model.tree_replace({"opt.disableflags": off})
 
 
 def _without_prints(model: Any) -> Any:
