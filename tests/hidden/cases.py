@@ -1,0 +1,189 @@
+"""Draws hidden cases: a stand, an effect of a given visibility, and the log of it.
+
+Visibility is the error on the recording that the believed model makes at best, over
+noise: believed figures are first moved within their tolerances as far as that helps.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+from hidden.recording import Recording, standard
+from hidden.sampling import Noise, exact, record, ticks
+from hidden.sizes import SCALES
+from hidden.stands import TOLERANCES, Stand, changed, make_stand, slightly_wrong
+from hidden.truth import OUTSIDE, Mechanism
+
+from sysid.data import MeasuredLog
+
+RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
+SLOW = ("thermal_derating", "clock_drift")
+"""Effects that a single round does not show."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A hidden case.
+
+    Attributes:
+        seed: of everything drawn.
+        stand: what is believed.
+        truth: what is really there.
+        effects: names of the hidden effects, the strongest first.
+        joint: name of the joint that has them.
+        magnitude: `weak`, `medium`, `strong`, or "" for none and invisible ones.
+        ratio: error over noise that was reached.
+        logs: what was measured.
+    """
+
+    seed: int
+    stand: Stand
+    truth: Mechanism
+    effects: tuple[str, ...]
+    joint: str
+    magnitude: str
+    ratio: float
+    logs: tuple[MeasuredLog, ...] = field(repr=False)
+
+
+def draw_case(
+    seed: int,
+    effects: tuple[str, ...] = (),
+    magnitude: str = "medium",
+    kind: str = "pendulum",
+    round_s: float = 12.0,
+    rate_hz: float = 200.0,
+    lowpass_hz: float | None = None,
+    noise: Noise | None = None,
+) -> Case:
+    """Draws a case.
+
+    Args:
+        seed: of everything.
+        effects: names of effects to hide, all in the same joint.
+        magnitude: of each of them alone; `invisible` for a torque limit that the
+            motion never reaches.
+        kind: stand.
+        round_s: length of a round of the standard recording [s].
+        rate_hz: rows in a second.
+        lowpass_hz: cutoff of the firmware; drawn from 3 and 15 Hz if not given.
+        noise: of the log.
+    """
+    rng = np.random.default_rng([seed, 1])
+    noise = noise or Noise()
+    cutoff = lowpass_hz or float(rng.choice([3.0, 15.0]))
+    stand = make_stand(kind, rng, cutoff)
+    once = standard(
+        rng, stand.middle, stand.reach, rate_hz, round_s, 1, len(stand.moved) == 1
+    )
+    truth = base = slightly_wrong(stand.mechanism, rng)
+    joint = int(rng.choice(stand.moved))
+    ratio = 1.0
+    shapes = int(rng.integers(2**31))
+    for index, name in enumerate(effects):
+        if magnitude == "invisible":
+            truth = _out_of_reach(truth, base, joint, once, rng)
+            continue
+        find = _Finder(stand, base, joint, name, once, noise, shapes + index)
+        size, ratio = find.size(RATIOS[magnitude])
+        truth = find.hidden(truth, size)
+    rounds = np.tile(once.targets, (3, 1))
+    whole = Recording(rate_hz, rounds, _parts(once, 3))
+    log = record(
+        truth,
+        whole,
+        noise,
+        rng,
+        palm_quat_w=stand.mechanism.base_quat_w,
+        source=f"hidden case {seed}",
+    )
+    names = stand.names
+    return Case(seed, stand, truth, effects, names[joint], magnitude, ratio, (log,))
+
+
+def _parts(once: Recording, rounds: int):
+    n = len(once.targets)
+    return tuple(
+        (name, k, first + k * n, last + k * n)
+        for k in range(rounds)
+        for name, _, first, last in once.parts
+    )
+
+
+def _out_of_reach(truth, base, joint, once, rng) -> Mechanism:
+    """Adds a torque limit above all that the motion asks for."""
+    times = np.arange(len(once.targets)) / once.rate_hz
+    _, torque, _ = exact(base, once, times)
+    limit = rng.uniform(1.5, 3.0) * float(np.max(np.abs(torque[:, joint])))
+    return truth.with_effect(joint, "torque_limit", limit_nm=limit)
+
+
+class _Finder:
+    """Finds the size at which an effect has a given visibility."""
+
+    def __init__(self, stand, base, joint, name, once, noise, shapes):
+        self.base, self.joint, self.name = base, joint, name
+        self.scale, self.shapes = SCALES[name], shapes
+        self.repeat = 3 if name in SLOW else 1
+        targets = np.tile(once.targets, (self.repeat, 1))
+        self.recording = Recording(once.rate_hz, targets, _parts(once, self.repeat))
+        self.times = ticks(self.recording, noise, np.random.default_rng(shapes))
+        speed = float(np.std(np.diff(once.targets, axis=0))) * once.rate_hz
+        self.sigma = noise.deviations(speed)
+        self.moved = list(stand.moved)
+        self.plain = self._seen(base)
+        figures = [f for f in TOLERANCES if f != self.scale.release]
+        self.bends = np.stack([self._bend(figure) for figure in figures], 1)
+        gram = self.bends.T @ self.bends + np.eye(len(figures))
+        self.solve = np.linalg.inv(gram)
+
+    def _seen(self, mechanism: Mechanism) -> np.ndarray:
+        """Angles and torques of the recorded joints, in deviations of their noise."""
+        angle, torque, _ = exact(mechanism, self.recording, self.times)
+        parts = (angle[:, self.moved], torque[:, self.moved])
+        scaled = [x / s for x, s in zip(parts, self.sigma, strict=True)]
+        return np.concatenate([x.ravel() for x in scaled])
+
+    def _bend(self, figure: str) -> np.ndarray:
+        """How the record changes when a believed figure moves by its tolerance."""
+        by = TOLERANCES[figure]
+        moved = changed(self.base, self.joint, figure, by)
+        return self._seen(moved) - self.plain
+
+    def hidden(self, mechanism: Mechanism, size: float) -> Mechanism:
+        """The mechanism with the effect; its shape is the same at every size."""
+        shape = np.random.default_rng(self.shapes)
+        return self.scale.apply(mechanism, self.joint, size, shape)
+
+    def ratio(self, size: float) -> float:
+        """Error over noise at a size."""
+        moved = self._seen(self.hidden(self.base, size)) - self.plain
+        if not np.all(np.isfinite(moved)):
+            return math.inf
+        rest = moved - self.bends @ (self.solve @ (self.bends.T @ moved))
+        return math.sqrt(1.0 + float(rest @ rest) / rest.size)
+
+    def size(self, target: float) -> tuple[float, float]:
+        """Finds the size for a ratio; returns it with the ratio that it reaches.
+
+        The excess error grows about with the square of the size, which gives the next
+        guess inside a bracket.
+        """
+        low, high = self.scale.low, self.scale.high
+        size = math.sqrt(low * high)
+        for _ in range(9):
+            reached = self.ratio(size)
+            short = (target**2 - 1.0) / max(reached**2 - 1.0, 1e-9)
+            if abs(math.log(short)) < 0.1:
+                break
+            low, high = (size, high) if short > 1.0 else (low, size)
+            guess = size * min(max(short, 1e-6), 1e6) ** 0.5
+            size = guess if low < guess < high else math.sqrt(low * high)
+        if size < self.scale.least:
+            return self.scale.least, self.ratio(self.scale.least)
+        return size, reached
+
+
+def outside(effects: tuple[str, ...]) -> bool:
+    """Whether the catalogue lacks one of the effects."""
+    return any(name in OUTSIDE for name in effects)

@@ -1,0 +1,150 @@
+"""Test stands: mechanisms as they are believed to be, before anything is hidden.
+
+`pendulum` is a servo with a weight, `joint` one joint of a finger of the hand, `finger`
+all four of one. The last two take the vendor's kinematics and the calibrated drive.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from hidden.truth import Joint, Link, Mechanism
+
+from envs.hand.figures import figures
+from envs.hand.hand_file import load_hand_file
+
+KINDS = ("pendulum", "joint", "finger")
+TOLERANCES = {
+    "kp": 0.05,
+    "kd": 0.1,
+    "armature": 0.05,
+    "mass": 0.05,
+    "delay_s": 0.05,
+    "lowpass_hz": 0.05,
+    "slew_rad_s": 0.05,
+    "offset_rad": 1e-3,
+}
+"""How wrong the believed figures may be: relative, the encoder's zero in radian."""
+
+
+@dataclass(frozen=True)
+class Stand:
+    """A believed mechanism and how it is recorded.
+
+    Attributes:
+        kind: one of `KINDS`.
+        mechanism: what is believed.
+        moved: joints that are recorded, by index.
+        middle, reach: angles about which and how far they move [rad].
+    """
+
+    kind: str
+    mechanism: Mechanism
+    moved: tuple[int, ...]
+    middle: np.ndarray
+    reach: np.ndarray
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the joints."""
+        return tuple(link.name for link in self.mechanism.links)
+
+
+def make_stand(kind: str, rng: np.random.Generator, lowpass_hz: float = 3.0) -> Stand:
+    """Draws a stand of a kind."""
+    if kind == "pendulum":
+        return _pendulum(rng, lowpass_hz)
+    finger = int(rng.integers(1, 5))
+    mechanism, middle, reach = _finger(finger, rng, lowpass_hz)
+    if kind == "finger":
+        return Stand(kind, mechanism, (0, 1, 2, 3), middle, reach)
+    joint = int(rng.integers(0, 4))
+    reach = np.where(np.arange(4) == joint, reach, 0.0)
+    return Stand(kind, mechanism, (joint,), middle, reach)
+
+
+def _pendulum(rng: np.random.Generator, lowpass_hz: float) -> Stand:
+    mass, length = rng.uniform(0.1, 0.25), rng.uniform(0.06, 0.12)
+    middle = rng.uniform(-0.6, 0.6)
+    link = Link(
+        name="servo",
+        pos=(0.0, 0.0, 0.0),
+        quat=(1.0, 0.0, 0.0, 0.0),
+        axis=(0.0, 1.0, 0.0),
+        mass=mass,
+        com=(0.0, 0.0, -length),
+        inertia_quat=(1.0, 0.0, 0.0, 0.0),
+        inertia=(4e-4 * mass, 4e-4 * mass, 4e-4 * mass),
+        range_rad=(middle - 2.0, middle + 2.0),
+    )
+    armature = rng.uniform(1e-3, 3e-3)
+    inertia = armature + mass * length**2
+    kp = inertia * (2.0 * math.pi * rng.uniform(6.0, 9.0)) ** 2
+    kd = 2.0 * rng.uniform(0.5, 0.8) * math.sqrt(kp * inertia)
+    joint = Joint(kp, kd, armature, 0.019, lowpass_hz, 8.0, 4.0 * mass)
+    mechanism = Mechanism((link,), (joint,))
+    return Stand("pendulum", mechanism, (0,), np.array([middle]), np.array([0.5]))
+
+
+def _finger(finger: int, rng: np.random.Generator, lowpass_hz: float):
+    """A finger of the hand (1 to 4; the thumb is left out) on a palm that is turned."""
+    hand, names = load_hand_file(), figures().joint_names
+    links, joints, middle, reach = [], [], [], []
+    for i in range(4 * finger, 4 * finger + 4):
+        figure = figures().links[i]
+        parent = "world" if i == 4 * finger else names[i - 1]
+        links.append(
+            Link(
+                name=figure.joint,
+                pos=figure.pos,
+                quat=figure.quat,
+                axis=(0.0, 1.0, 0.0),
+                mass=figure.mass,
+                com=figure.inertial_pos,
+                inertia_quat=figure.inertial_quat,
+                inertia=figure.diaginertia,
+                range_rad=figure.range_rad,
+                parent=parent,
+            )
+        )
+        joints.append(
+            Joint(
+                kp=figure.kp * hand.stiffness_scale.per_joint()[i],
+                kd=figure.kv * hand.damping_scale.per_joint()[i],
+                armature=figure.armature,
+                delay_s=hand.delay_s.value,
+                lowpass_hz=lowpass_hz,
+                slew_rad_s=float(hand.speed_limit.per_joint()[i]),
+                limit_nm=figure.force_limit * hand.torque_scale.per_joint()[i],
+            )
+        )
+        low, high = figure.range_rad
+        middle.append(0.5 * (low + high))
+        reach.append(min(0.5, 0.4 * (high - low)))
+    quat = rng.normal(size=4)
+    quat /= np.linalg.norm(quat)
+    mechanism = Mechanism(tuple(links), tuple(joints), tuple(quat.tolist()))
+    return mechanism, np.array(middle), np.array(reach)
+
+
+def changed(mechanism: Mechanism, joint: int, figure: str, by: float) -> Mechanism:
+    """Returns a mechanism with one figure of a joint off by a share (or, the
+    encoder's zero, by an angle).
+    """
+    if figure == "mass":
+        masses = list(mechanism.payload_kg or (0.0,) * len(mechanism.links))
+        masses[joint] += by * mechanism.links[joint].mass
+        return replace(mechanism, payload_kg=tuple(masses))
+    old = mechanism.joints[joint]
+    value = getattr(old, figure)
+    new = value + by if figure == "offset_rad" else value * (1.0 + by)
+    return mechanism.with_joint(joint, replace(old, **{figure: new}))
+
+
+def slightly_wrong(mechanism: Mechanism, rng: np.random.Generator) -> Mechanism:
+    """Returns what a mechanism may be while it is believed to be this one."""
+    for joint in range(len(mechanism.joints)):
+        for figure, tolerance in TOLERANCES.items():
+            by = tolerance * rng.uniform(-1.0, 1.0)
+            mechanism = changed(mechanism, joint, figure, by)
+    return mechanism
