@@ -7,6 +7,7 @@ from typing import Any
 from envs.batch import BatchEnv, Env
 from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError, one_of
+from envs.keyboard import KeyboardConfig, KeyboardEnv
 from envs.recovery import RecoveryConfig, RecoveryEnv
 
 
@@ -71,3 +72,4 @@ def make_batch(
 
 register("crawl", Task(CrawlConfig, CrawlEnv))
 register("recovery", Task(RecoveryConfig, RecoveryEnv))
+register("keyboard", Task(KeyboardConfig, KeyboardEnv))

@@ -40,6 +40,15 @@ from rewards.footprint import (
     init_footprint_memory,
 )
 from rewards.gates import in_contact, is_commanded
+from rewards.keyboard import (
+    fingertip_distance,
+    keys_touched,
+    other_depth,
+    requested_depth,
+    support_contact,
+    support_drift,
+)
+from rewards.keyboard_table import KEYBOARD
 from rewards.lift import (
     LiftMemory,
     LiftParams,
@@ -60,6 +69,7 @@ from rewards.tracking import track_planar_velocity, track_yaw_rate
 
 __all__ = [
     "CRAWL",
+    "KEYBOARD",
     "RECOVERY",
     "STOCK",
     "AirTimeMemory",
@@ -76,6 +86,7 @@ __all__ = [
     "action_rate",
     "air_time_step",
     "evaluate",
+    "fingertip_distance",
     "flat_orientation",
     "foot_slide",
     "footprint_departure",
@@ -86,16 +97,21 @@ __all__ = [
     "init_lift_memory",
     "is_commanded",
     "joint_acceleration",
+    "keys_touched",
     "lift_frequency_hz",
     "lift_gate",
     "lift_step",
+    "other_depth",
     "palm_tilt",
     "precomputed",
+    "requested_depth",
     "roll_pitch_rate",
     "safe_norm",
     "smoothstep",
     "stance_height",
     "stance_pose",
+    "support_contact",
+    "support_drift",
     "swing_against_command",
     "table_weights",
     "torque",

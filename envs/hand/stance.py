@@ -51,24 +51,28 @@ class Stance:
 
 
 @cache
-def load_stance() -> Stance:
-    """Reads `stance.json` beside this file."""
-    raw = json.loads(files("envs.hand").joinpath("stance.json").read_text("utf-8"))
+def load_stance(package: str = "envs.hand", name: str = "stance.json") -> Stance:
+    """Reads a stored stance, the crawl stance if not told otherwise."""
+    raw = json.loads(files(package).joinpath(name).read_text("utf-8"))
     lists = {k: tuple(v) for k, v in raw.items() if isinstance(v, list)}
     lists["footprint_v"] = tuple(tuple(tip) for tip in raw["footprint_v"])
     return Stance(**(raw | lists))
 
 
-def stance_of(hand: HandFile) -> Stance:
-    """The crawl stance of a hand: the stored one, settled anew for another hand.
+def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
+    """The stance of a hand: the stored one, settled anew for another hand.
 
     The joint targets are the same; how deep a hand sinks under them depends on its
     mass, stiffness and friction.
 
+    Args:
+        hand: the hand file.
+        stored: stance of the default hand; the crawl stance if not given.
+
     Raises:
         InputError: the hand does not stand under these targets.
     """
-    stored = load_stance()
+    stored = stored or load_stance()
     if hand.sha256 == stored.hand_sha256:
         return stored
     return settle(hand, stored.qpos, np.array(stored.target_rad))

@@ -1,0 +1,101 @@
+"""What differs from keyboard to keyboard, and how it lies before the hand."""
+
+from dataclasses import dataclass, field
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+import mujoco
+from jaxtyping import Array, Float
+
+from envs.errors import check_ordered
+from envs.keyboard_model import (
+    ACTUATION_M,
+    FORCE_N,
+    KEY_NAMES,
+    KEYBOARD,
+    key_spring,
+)
+from envs.physics import ModelFields
+from envs.streams import stream
+
+
+@dataclass(frozen=True)
+class KeyboardVariation:
+    """Ranges of the draws.
+
+    Attributes:
+        force_scale: factor on each key's operating force (data sheet: ± 0.7 oz of 2.1).
+        actuation_m: actuation depth of each key (data sheet: 2.0 ± 0.6 mm).
+        height_m: largest error of the keys' height (ours).
+        align_m: largest error of the alignment, right and away (ours; the paper's
+            operator aligns by trial presses).
+        align_deg: largest error of the heading (ours).
+    """
+
+    force_scale: tuple[float, float] = field(
+        default=(0.67, 1.33), metadata={"unit": "1", "low": 0.1}
+    )
+    actuation_m: tuple[float, float] = field(
+        default=(0.0014, 0.0026), metadata={"unit": "m", "low": 0.001, "high": 0.0035}
+    )
+    height_m: float = field(default=0.0015, metadata={"unit": "m", "low": 0.0})
+    align_m: float = field(default=0.003, metadata={"unit": "m", "low": 0.0})
+    align_deg: float = field(default=3.0, metadata={"unit": "deg", "low": 0.0})
+
+    def __post_init__(self) -> None:
+        check_ordered(self, "force_scale", "actuation_m")
+
+
+def nominal_keyboard() -> KeyboardVariation:
+    """The keyboard of the figures, perfectly aligned."""
+    depth = (ACTUATION_M, ACTUATION_M)
+    return KeyboardVariation((1.0, 1.0), depth, 0.0, 0.0, 0.0)
+
+
+@flax.struct.dataclass
+class KeyboardDraw:
+    """One world's keyboard.
+
+    Attributes:
+        force_n: operating force of each key [N].
+        actuation_m: actuation depth of each key [m].
+        height_m: how much higher the keyboard is [m].
+    """
+
+    force_n: Float[Array, "*b keys"]
+    actuation_m: Float[Array, "*b keys"]
+    height_m: Float[Array, "*b"]
+
+
+def draw_keyboard(world: Array, config: KeyboardVariation) -> KeyboardDraw:
+    """Draws the keyboard of a world.
+
+    Args:
+        world: the world's random key.
+        config: ranges.
+    """
+    key, keys = stream(world, "keyboard"), (len(KEY_NAMES),)
+    low, high = config.force_scale
+    scale = jax.random.uniform(stream(key, "force"), keys, minval=low, maxval=high)
+    low, high = config.actuation_m
+    depth = jax.random.uniform(stream(key, "depth"), keys, minval=low, maxval=high)
+    height = jax.random.uniform(stream(key, "height"), (), minval=-1.0)
+    return KeyboardDraw(FORCE_N * scale, depth, config.height_m * height)
+
+
+def keyboard_fields(
+    model: mujoco.MjModel, fields: ModelFields, draw: KeyboardDraw
+) -> ModelFields:
+    """Adds what a world's keyboard differs in to the model fields of its hand."""
+    board = model.body(KEYBOARD).id
+    joints = jnp.array([model.joint(f"key_{name}").id for name in KEY_NAMES])
+    adr = jnp.array([model.joint(f"key_{name}").qposadr[0] for name in KEY_NAMES])
+    stiffness, free_m = key_spring(draw.force_n, draw.actuation_m)
+    body_pos = fields.get("body_pos", jnp.asarray(model.body_pos))
+    springs = {
+        "jnt_stiffness": jnp.asarray(model.jnt_stiffness).at[joints].set(stiffness),
+        "qpos_spring": jnp.asarray(model.qpos_spring).at[adr].set(free_m),
+        "body_pos": body_pos.at[board, 2].add(draw.height_m),
+    }
+    return fields | springs
