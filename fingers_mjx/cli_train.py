@@ -60,8 +60,9 @@ def _new(args: argparse.Namespace) -> Setup:
         raise InputError("TASK", "", "", one_of(task_names()))
     get_task(args.task)
     backend = check_backend(args.backend or default_backend())
-    chosen = preset(args.preset or ("fast" if backend == "warp" else "cpu"))
-    given = {"task": args.task, "backend": backend}
+    name = args.preset or ("fast" if backend == "warp" else "cpu")
+    chosen = preset(name, args.task)
+    given: dict[str, Any] = {"backend": backend}
     if args.seed is not None:
         given["seed"] = args.seed
     train_config = dataclasses.replace(chosen, **given)

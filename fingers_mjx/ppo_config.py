@@ -9,6 +9,8 @@ from envs.errors import InputError, one_of
 
 POSITIVE = 1e-9
 """Lower bound of numbers that must be above zero."""
+SMALL_MEAN_SCALE = 0.01
+"""`init_mean_scale` of policies that hardly act at the start (ours)."""
 
 
 def _number(default: Any, low: Any, high: Any = None, **notes: Any) -> Any:
@@ -133,7 +135,7 @@ def cpu() -> TrainConfig:
         actor_layers=(256, 128),
         critic_layers=(256, 128),
         init_noise_std=0.4,
-        init_mean_scale=0.01,
+        init_mean_scale=SMALL_MEAN_SCALE,
     )
     return TrainConfig(
         preset="cpu",
@@ -148,15 +150,29 @@ def cpu() -> TrainConfig:
 PRESETS = {"paper": paper, "fast": fast, "cpu": cpu}
 
 
-def preset(name: str) -> TrainConfig:
-    """Returns a fresh configuration of the preset `name`.
+def preset(name: str, task: str = "crawl") -> TrainConfig:
+    """Returns a fresh configuration of the preset `name` for a task.
+
+    Tasks other than crawling start with small outputs. A hand that starts far from its
+    reference angles gives large and nearly constant inputs until the first iteration
+    has filled the normalizer, and with weights of usual size the first updates then
+    change the policy by a divergence of 100 nat, after which the rate is at its lower
+    bound and nothing is learned.
+
+    Args:
+        name: of the preset.
+        task: registered name of the task.
 
     Raises:
         InputError: if there is no such preset.
     """
     if name not in PRESETS:
         raise InputError("preset", "", name, one_of(PRESETS, name))
-    return PRESETS[name]()
+    config = dataclasses.replace(PRESETS[name](), task=task)
+    if task == "crawl":
+        return config
+    small = dataclasses.replace(config.ppo, init_mean_scale=SMALL_MEAN_SCALE)
+    return dataclasses.replace(config, ppo=small)
 
 
 def bound_fields(config: TrainConfig) -> dict[str, Any]:

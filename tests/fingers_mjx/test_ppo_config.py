@@ -33,6 +33,15 @@ def test_paper_preset_is_the_paper():
     assert config.steps_per_iteration * config.iterations == 786_432_000
 
 
+@pytest.mark.parametrize("name", PRESETS)
+def test_tasks_that_start_far_from_the_stance_start_with_small_outputs(name):
+    crawl, recovery = preset(name, "crawl"), preset(name, "recovery")
+    assert crawl == preset(name) == PRESETS[name]()
+    assert (recovery.task, recovery.ppo.init_mean_scale) == ("recovery", 0.01)
+    same = dataclasses.replace(recovery.ppo, init_mean_scale=crawl.ppo.init_mean_scale)
+    assert dataclasses.replace(recovery, task="crawl", ppo=same) == crawl
+
+
 def test_unknown_preset_lists_the_valid_ones():
     with pytest.raises(InputError, match="did you mean paper"):
         preset("papr")
