@@ -18,6 +18,7 @@ EFFECT = EffectKind(
         "stiffness": "a known load or the effort: without one only ratios are seen",
         "payload_mass": "holds in several postures: rotors have no weight there",
         "transport_delay": "chirp: inertia bends the gain",
+        "compliance": "chirp past the resonance: a spring turns the phase once more",
     },
     source="R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008",
 )

@@ -23,7 +23,9 @@ def _transmission(params: Params, lead, x, dt):
     down = jnp.where(touches_down, jnp.minimum(x.torque, 0.0), 0.0)
     follow = -jnp.expm1(-x.kp / jnp.maximum(x.kd, 1e-12) * dt)
     moved = lead + follow * x.error - dt * x.qd
-    return jnp.clip(moved, -half, half), x.replace(torque=up + down)
+    torque = up + down
+    damping = jnp.where(torque == 0.0, 0.0, x.damping)
+    return jnp.clip(moved, -half, half), x.replace(torque=torque, damping=damping)
 
 
 EFFECT = EffectKind(

@@ -2,7 +2,8 @@
 
 An effect is one file with one `EffectKind`. Its functions work elementwise in the
 joints: the same code serves one joint of a test stand and the twenty of a hand, a
-single world and a batch under `vmap`, identification and training.
+single world and a batch under `vmap`, identification and training. Effects of the
+whole hand change the physics model or what the IMU tells instead.
 """
 
 import enum
@@ -13,6 +14,8 @@ from typing import Any
 import flax.struct
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
+
+from envs.hand.effects.surroundings import ALONE, Imu, Scene, Surroundings
 
 Params = Mapping[str, Array]
 """Values of an effect's parameters by name, scalar or one per joint; may be traced."""
@@ -28,12 +31,19 @@ class Substep:
         encoder, encoder_speed: what the servo's encoder tells it [rad], [rad/s].
         error: command − encoder, as the servo weighs it [rad].
         kp, kd: gains of the servo [N·m/rad], [N·m·s/rad].
-        torque: torque of the drive on the joint [N·m].
+        effort: torque of the motor, as its current tells it [N·m].
+        follows: share of kp and kd with which the effort follows error and speed; 0
+            where it is limited.
+        torque: torque of the drive on the joint [N·m]: the effort behind the gears.
+        damping: how fast `torque` falls with the joint's speed, ≥ 0 [N·m·s/rad]; an
+            integrator takes it implicitly, for a stiff servo is unstable without.
+        passive: torque of springs in parallel to the drive [N·m].
         load: torque of everything else on the joint, e.g. gravity [N·m].
         friction: largest dry friction, ≥ 0 [N·m]; see `effects.joint`.
         viscous: viscous friction, ≥ 0 [N·m·s/rad].
         inertia: inertia that the drive adds to the joint [kg·m²].
         reading: angle that reaches host and log [rad].
+        around: what the rest of the hand is doing.
     """
 
     command: Float[Array, "*j"]
@@ -44,17 +54,23 @@ class Substep:
     error: Float[Array, "*j"]
     kp: Float[Array, "*j"]
     kd: Float[Array, "*j"]
+    effort: Float[Array, "*j"]
+    follows: Float[Array, "*j"]
     torque: Float[Array, "*j"]
+    damping: Float[Array, "*j"]
+    passive: Float[Array, "*j"]
     load: Float[Array, "*j"]
     friction: Float[Array, "*j"]
     viscous: Float[Array, "*j"]
     inertia: Float[Array, "*j"]
     reading: Float[Array, "*j"]
+    around: Surroundings = ALONE
 
 
 class Stage(enum.Enum):
     """Where in the substep an effect acts, in the order of the chain."""
 
+    LOAD = "load"
     COMMAND = "command"
     ENCODER = "encoder"
     GAINS = "gains"
@@ -68,6 +84,10 @@ class Stage(enum.Enum):
 
 Act = Callable[[Params, Any, Substep, float], tuple[Any, Substep]]
 """(parameters, state, signals, substep [s]) -> new state, changed signals; pure."""
+
+
+ChangeModel = Callable[[Params, Scene, dict[str, Array]], dict[str, Array]]
+"""(parameters, scene, `MjModel` fields of a world) -> changed fields; pure."""
 
 
 def lognormal(median: float, factor: float) -> "Prior":
@@ -142,6 +162,11 @@ class EffectKind:
             tells them apart.
         source: literature.
         init: state at rest, from (parameters, target [rad], angle [rad], substep [s]).
+        needs: fields of `Surroundings` without which `acts` cannot be computed.
+        changes_model: (parameters, scene, model fields) -> changed model fields, for
+            effects that the physics model of the whole hand can have; there they act
+            by it alone. Parameters are per finger or for the hand.
+        senses: (parameters, reading of the IMU) -> changed reading.
     """
 
     name: str
@@ -151,6 +176,9 @@ class EffectKind:
     confusable_with: Mapping[str, str]
     source: str
     init: Callable[[Params, Any, Any, float], Any] = field(default=_stateless)
+    needs: tuple[str, ...] = ()
+    changes_model: ChangeModel | None = None
+    senses: Callable[[Params, Imu], Imu] | None = None
 
     def identity(self) -> dict[str, float]:
         """Returns parameters at which the effect vanishes."""

@@ -6,7 +6,9 @@ from typing import Any
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from envs.errors import InputError
 from envs.hand.effects.base import EffectKind, Params, Stage, Substep
+from envs.hand.effects.surroundings import ALONE, Surroundings
 
 Model = Sequence[tuple[EffectKind, Params]]
 """Effects with their parameters; those of one stage act in this order."""
@@ -36,6 +38,7 @@ def chain_step(
     kp: Float[ArrayLike, "*j"],
     kd: Float[ArrayLike, "*j"],
     dt: float,
+    around: Surroundings = ALONE,
 ) -> tuple[tuple[Any, ...], Substep]:
     """Runs one substep: target → command → servo → transmission → friction → reading.
 
@@ -54,11 +57,16 @@ def chain_step(
         kp: nominal position gain [N·m/rad].
         kd: nominal velocity gain [N·m·s/rad].
         dt: substep [s].
+        around: what the rest of the hand does, for effects that need it.
 
     Returns:
-        The new states, and the signals: torque, friction, viscous friction and inertia
-        go to the physics, the reading to the observer.
+        The new states, and the signals: torques, friction, damping and inertia go to
+        the physics (see `effects.joint`), effort and reading to the observer.
+
+    Raises:
+        InputError: an effect needs surroundings that are not given.
     """
+    _check_surroundings(model, around)
     kp, kd, load = (jnp.broadcast_to(x, jnp.shape(q)) for x in (kp, kd, load))
     none = jnp.zeros_like(q)
     x = Substep(
@@ -70,12 +78,17 @@ def chain_step(
         error=none,
         kp=kp,
         kd=kd,
+        effort=none,
+        follows=jnp.ones_like(none),
         torque=none,
+        damping=none,
+        passive=none,
         load=load,
         friction=none,
         viscous=none,
         inertia=none,
         reading=none,
+        around=around,
     )
     for stage in Stage:
         x = _servo(stage, x)
@@ -89,6 +102,8 @@ def _servo(stage: Stage, x: Substep) -> Substep:
         return x.replace(error=x.command - x.encoder)
     if stage is Stage.TORQUE:
         return x.replace(torque=x.kp * x.error - x.kd * x.encoder_speed)
+    if stage is Stage.TRANSMISSION:
+        return x.replace(effort=x.torque, damping=x.follows * x.kd)
     if stage is Stage.READING:
         return x.replace(reading=x.encoder)
     return x
@@ -104,3 +119,11 @@ def _act(
             state, x = act(params, state, x, dt)
         after.append(state)
     return tuple(after), x
+
+
+def _check_surroundings(model: Model, around: Surroundings) -> None:
+    for kind, _ in model:
+        for name in kind.needs:
+            if getattr(around, name) is None:
+                valid = "an effect whose surroundings are given"
+                raise InputError("effect", f"{kind.name}.{name}", "nothing", valid)

@@ -1,8 +1,9 @@
 """Motion of one joint with dry friction that sticks, for logs of single joints.
 
-In the physics of the hand the same figures are the `frictionloss`, `damping` and
-`armature` of the joint, which MuJoCo solves as a constraint in the same way: friction
-opposes motion with at most its bound and stops it, but never turns it round.
+In the physics of the hand the same figures are `frictionloss`, `damping` and
+`armature` of the joint and the velocity gain of its actuator. MuJoCo solves friction as
+a constraint in the same way: it opposes motion with at most its bound and stops it, but
+never turns it round; and it takes damping and velocity gain implicitly.
 """
 
 import jax.numpy as jnp
@@ -16,11 +17,12 @@ def joint_step(
 ) -> tuple[Float[Array, "*j"], Float[Array, "*j"]]:
     """Advances angle and speed of a joint by one substep.
 
-        (I + Δt b) v* = I v + Δt (τ + τ_load)
-        v' = sign(v*) max(|v*| − Δt F / (I + Δt b), 0),   q' = q + Δt v'
+        H = I + Δt (b + d),   v* = v + Δt (τ + τ_passive + τ_load − b v) / H
+        v' = sign(v*) max(|v*| − Δt F / H, 0),   q' = q + Δt v'
 
-    Semi-implicit Euler, friction implicit: with bounds F ≥ 0 and b ≥ 0 it takes energy
-    at any Δt, and a joint sticks exactly while |τ + τ_load| ≤ F.
+    with the drive's damping d = −∂τ/∂v. Semi-implicit Euler, friction and damping
+    implicit: with bounds F ≥ 0 and b ≥ 0 friction takes energy at any Δt, and a joint
+    sticks exactly while |τ + τ_passive + τ_load| ≤ F.
 
     Args:
         x: signals from `chain_step`.
@@ -30,8 +32,9 @@ def joint_step(
     Returns:
         Angle [rad] and speed [rad/s] after the substep.
     """
-    total = inertia + x.inertia
-    heavy = total + dt * x.viscous
-    free = (total * x.qd + dt * (x.torque + x.load)) / heavy
+    total = jnp.maximum(inertia + x.inertia, 0.0)
+    heavy = total + dt * (x.viscous + x.damping)
+    torque = x.torque + x.passive + x.load
+    free = x.qd + dt * (torque - x.viscous * x.qd) / heavy
     speed = jnp.sign(free) * jnp.maximum(jnp.abs(free) - dt * x.friction / heavy, 0.0)
     return x.q + dt * speed, speed

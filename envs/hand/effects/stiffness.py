@@ -19,6 +19,11 @@ EFFECT = EffectKind(
         "encoder_scale": "full range without load: a gain error leaves no error there",
         "torque_limit": "amplitude: a limit leaves small motions alone",
         "load_friction": "loaded motion both ways: friction opens a loop",
+        "compliance": "chirp past the resonance: a spring turns the phase once more",
+        "finger_weakness": "amplitude: weakness also lowers the limit",
+        "supply_sag": "one joint alone against all together",
+        "thermal_derating": "the same motion before and after a warm-up, and "
+        "after a pause",
     },
     source="Paper, Table I (stiffness 15–22 times nominal, from frequency sweeps)",
 )

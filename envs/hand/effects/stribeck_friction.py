@@ -22,6 +22,7 @@ EFFECT = EffectKind(
         "coulomb_friction": "slow ramps at four speeds: the dip of force over speed",
         "backlash": "ramps without reversal",
         "command_quantization": "slow ramps at two speeds",
+        "hysteresis": "motions smaller than the presliding range",
     },
     source="B. Armstrong-Hélouvry et al., Automatica 30(7), 1994; "
     "C. Canudas de Wit et al., IEEE Trans. Automatic Control 40(3), 1995",

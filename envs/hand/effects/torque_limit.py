@@ -6,8 +6,10 @@ from envs.hand.effects.base import EffectKind, Parameter, Params, Stage, lognorm
 
 
 def _act(params: Params, state, x, dt):
+    """A drive at its limit does not depend on speed."""
     limit = params["limit_nm"]
-    return state, x.replace(torque=jnp.clip(x.torque, -limit, limit))
+    follows = jnp.where(jnp.abs(x.torque) >= limit, 0.0, x.follows)
+    return state, x.replace(torque=jnp.clip(x.torque, -limit, limit), follows=follows)
 
 
 EFFECT = EffectKind(
@@ -26,6 +28,7 @@ EFFECT = EffectKind(
         "stiffness": "amplitude: a limit leaves small motions alone",
         "load_friction": "effort: a limit is flat",
         "torque_slope_limit": "effort during a long push: a slope goes on rising",
+        "finger_weakness": "small motions: a limit leaves them alone",
     },
     source="Paper, drive (1.0 A for each joint)",
 )

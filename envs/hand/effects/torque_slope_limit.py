@@ -8,7 +8,8 @@ from envs.hand.effects.base import EffectKind, Parameter, Params, Stage, lognorm
 def _act(params: Params, last, x, dt):
     reach = params["slope_nm_s"] * dt
     torque = jnp.clip(x.torque, last - reach, last + reach)
-    return torque, x.replace(torque=torque)
+    follows = jnp.where(torque == x.torque, x.follows, 0.0)
+    return torque, x.replace(torque=torque, follows=follows)
 
 
 EFFECT = EffectKind(

@@ -46,6 +46,7 @@ EFFECT = EffectKind(
         "armature": "chirp: inertia bends the gain",
         "damping": "chirp near resonance: damping lowers the peak",
         "torque_slope_limit": "steps of two sizes, in the effort: ramps of one slope",
+        "clock_drift": "the lag at the beginning and at the end of a long record",
     },
     source="Paper, Table I (closed-loop delay 19 ms)",
     init=lambda params, target, q, dt: delay_line(target, dt),
