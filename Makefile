@@ -6,7 +6,7 @@ RUN := $(UV) run --no-sync
 QUICK := tests/test_layers.py tests/test_documentation.py tests/rewards
 
 .DEFAULT_GOAL := help
-.PHONY: help sync format check test test-slow test-gpu demo bench build clean
+.PHONY: help sync format check test test-slow test-gpu demo battery bench build clean
 
 help: ## List the targets
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "%-10s %s\n", $$1, $$2}'
@@ -37,6 +37,9 @@ test-gpu: sync ## The tests that need an NVIDIA GPU
 
 demo: sync ## The walking hand: evaluate, play, train, export, one report
 	$(RUN) fingers demo
+
+battery: sync ## Hide effects, ask the diagnosis, count how often it is right (hours)
+	PYTHONPATH=.:tests $(RUN) python tests/sysid/battery.py --out build/battery
 
 bench: sync ## Speed of physics, environment and PPO on this machine
 	$(RUN) python benchmarks/throughput.py

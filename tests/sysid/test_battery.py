@@ -1,0 +1,84 @@
+"""The battery's own arithmetic, on verdicts that are known."""
+
+import importlib.util
+from pathlib import Path
+
+import pytest
+from hidden.score import Row, confusion, figures, report, upper_bound
+
+SPEC = importlib.util.spec_from_file_location(
+    "battery", Path(__file__).with_name("battery.py")
+)
+assert SPEC is not None and SPEC.loader is not None
+BATTERY = importlib.util.module_from_spec(SPEC)
+SPEC.loader.exec_module(BATTERY)
+
+
+def row(group="single", effects=("backlash",), ratio=2.0, **said):
+    said = {"verdict": "found", "causes": effects, **said}
+    magnitude = {"invisible": "invisible"}.get(group, "medium")
+    return Row(group, 1, "pendulum", tuple(effects), "servo", magnitude, ratio, **said)
+
+
+def perfect():
+    return [
+        row(errors={"backlash.gap_rad": 0.01}, covered={"x": True}, explained=0.97),
+        row(effects=("deadband",), rivals=("backlash",), ratio=1.3),
+        row("none", (), verdict="none"),
+        row("double", ("backlash", "deadband")),
+        row("outside", ("gear_ripple",), verdict="unexplained", causes=()),
+        row("invisible", ("torque_limit",), verdict="not_observable", causes=()),
+    ]
+
+
+def wrong():
+    return [
+        row(causes=("deadband", "stiffness"), errors={"x": 0.5}),
+        row("none", (), verdict="found", causes=("stiffness",)),
+        row("double", ("backlash", "deadband"), causes=("backlash",)),
+        row("outside", ("gear_ripple",), verdict="found", causes=("backlash",)),
+        row("invisible", ("torque_limit",), verdict="none", causes=()),
+        row(verdict="error", causes=()),
+    ]
+
+
+def test_figures_of_a_right_and_of_a_wrong_diagnosis():
+    good, bad = figures(perfect()), figures(wrong())
+    rates = ("in named set", "no second cause", "both of two", "outside: unexplained")
+    for name in (*rates, "invisible: not observable"):
+        assert (good[name]["rate"], bad[name]["rate"]) == (1.0, 0.0), name
+    assert good["first medium"] == {"rate": 1.0, "n": 1}
+    assert good["first weak"] == {"rate": 1.0, "n": 1}
+    assert bad["first medium"] == {"rate": 0.0, "n": 2}
+    assert good["set size"] == {"mean": 1.5, "n": 2}
+    assert good["size error"]["median"] == 0.01
+    assert bad["size error"]["n"] == 0  # of a wrong name no size is right
+    assert (good["false alarms"]["rate"], bad["false alarms"]["rate"]) == (0.0, 1.0)
+    assert bad["errors raised"]["rate"] == pytest.approx(1 / 6)
+
+
+def test_upper_bound_is_that_of_the_literature():
+    """No alarm in 60 records: less than 4.9 % at 95 %; the rule of three."""
+    assert upper_bound(0, 60) == pytest.approx(0.0487, abs=2e-4)
+    assert upper_bound(10, 200) == pytest.approx(0.0834, abs=5e-4)
+    assert upper_bound(3, 3) == 1.0
+
+
+def test_rows_read_back_and_are_reported():
+    for r in perfect() + wrong():
+        assert Row.from_json(r.to_json()) == r
+    assert confusion(wrong())["backlash"] == {"deadband": 1, "error": 1}
+    text = report(perfect())
+    assert "torque_limit (invisible) not_observable 1" in text
+    assert "outside: gear_ripple" in text
+
+
+def test_a_plan_repeats_and_has_all_groups():
+    tasks = BATTERY.plan(5, BATTERY.FULL)
+    assert tasks == BATTERY.plan(5, BATTERY.FULL) != BATTERY.plan(6, BATTERY.FULL)
+    assert len({t.seed for t in tasks}) == len(tasks) == BATTERY.FULL
+    groups = [t.group for t in tasks]
+    assert groups.count("none") >= 200
+    singles = {(t.effects[0], t.magnitude) for t in tasks if t.group == "single"}
+    assert len(singles) == 3 * len(BATTERY.CATALOGUE)
+    assert all(len(set(t.effects)) == 2 for t in tasks if t.group == "double")
