@@ -2,12 +2,12 @@
 
     operator selects ──► policy ──(recovery, upright)──► settle ramp ──► first policy
 
+A recovery policy that is the first itself goes on holding the stance after the ramp.
 While the supervisor does not let the policy run, every policy starts afresh at the
 targets on the wire.
 """
 
 from collections import deque
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,29 +25,17 @@ from fingers_deploy.behaviour.hand_over import (
     resized,
 )
 from fingers_deploy.behaviour.heading import HeadingConfig, heading_step
+from fingers_deploy.behaviour.settle import Ramp, settle_ramp
 from fingers_deploy.behaviour.upright import tilt_angle, upright_step
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.rotations import gravity, heading, multiply
 from fingers_deploy.runtime.link import encode_answer
 from fingers_deploy.safety.detect_policy import complement
-from fingers_deploy.safety.motion import ramp_duration, smooth_ramp
 from fingers_deploy.safety.types import PolicyFault, Proposal
 
 Array = NDArray[np.float64]
-SETTLE_S = 1.5
 RECOVERY = "recovery"
-_RAMP_SHARE = 0.8  # of the fastest motion that the policies may ask for
 _YAW = 2  # entry of the crawl command
-
-
-@dataclass(frozen=True)
-class Ramp:
-    """A settle ramp: from the targets at `start_s` to the pose of the first policy."""
-
-    start_s: float
-    start_rad: Array
-    goal_rad: Array
-    duration_s: float
 
 
 class Policies:
@@ -82,6 +70,11 @@ class Policies:
     def active(self) -> int:
         """Number of the policy that runs."""
         return self._active
+
+    @property
+    def settling(self) -> bool:
+        """Whether a ramp moves the targets, or holds them where it ended."""
+        return self._ramp is not None
 
     def answer(self, packet: np.void) -> bytes:
         """Answers one observation of the supervisor."""
@@ -175,26 +168,21 @@ class Policies:
     def _look_for_upright(self, packet: np.void, target: Array, t: float) -> None:
         """Recovery is over once the hand is upright: settle, then the first policy."""
         manifest = self._controllers[self._active].bundle.manifest
-        if manifest.task != RECOVERY or self._active == 0:
+        if manifest.task != RECOVERY:
             return
         tilt = tilt_angle(packet["quat"], manifest.interface.v_quat_b)
         speed = float(np.linalg.norm(packet["gyro"]))
         self._upright_s, upright = upright_step(self._upright_s, tilt, speed, t)
         if upright:
-            first = self._controllers[0].bundle.manifest.interface
-            goal = np.asarray(first.initial_target_rad, np.float64)
-            action = manifest.interface.action
-            speed = _RAMP_SHARE * action.scale_rad * first.control_rate_hz
-            duration = ramp_duration(target, goal, SETTLE_S, speed)
-            self._ramp = Ramp(t, target, goal, duration)
+            goal = self._controllers[0].bundle.manifest.interface.initial_target_rad
+            self._ramp = settle_ramp(t, target, goal, manifest.interface)
 
     def _follow_ramp(self, packet: np.void, command: NDArray, t: float) -> Array:
         ramp = self._ramp
         assert ramp is not None
-        elapsed = t - ramp.start_s
-        target = smooth_ramp(ramp.start_rad, ramp.goal_rad, elapsed, ramp.duration_s)
+        target = ramp.target(t)
         self._keep(packet, command, target - packet["target"])
-        if elapsed >= ramp.duration_s:
+        if ramp.over(t) and self._active != 0:
             self._ramp, self._upright_s = None, np.inf
             self._hand_over(0, target)
         return target

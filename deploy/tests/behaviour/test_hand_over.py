@@ -202,6 +202,17 @@ def test_recovery_settles_into_the_first_policy_once_upright(
     assert not runner.policies._controllers[0].faults
 
 
+def test_recovery_alone_holds_the_stance_that_it_settled_into(
+    bundle_factory, interface
+):
+    runner = Runner([_recovery(bundle_factory, interface)])
+    for k in range(150):
+        runner.step()
+        assert runner.policies.settling == (k >= 25)
+    stance = np.asarray(interface.initial_target_rad)
+    np.testing.assert_allclose(runner.target, stance, atol=1e-12)
+
+
 def test_heading_hold_replaces_the_yaw_rate(bundle):
     hold = HeadingConfig(1.0, 0.05, -0.45, 0.45)
     runner = Runner([bundle], sticks=(0.0, 0.0, 0.0), hold=hold)
