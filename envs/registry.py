@@ -8,6 +8,7 @@ from envs.batch import BatchEnv, Env
 from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError, one_of
 from envs.keyboard import KeyboardConfig, KeyboardEnv
+from envs.push import PushConfig, PushEnv
 from envs.recovery import RecoveryConfig, RecoveryEnv
 
 
@@ -72,4 +73,5 @@ def make_batch(
 
 register("crawl", Task(CrawlConfig, CrawlEnv))
 register("recovery", Task(RecoveryConfig, RecoveryEnv))
+register("push", Task(PushConfig, PushEnv))
 register("keyboard", Task(KeyboardConfig, KeyboardEnv))

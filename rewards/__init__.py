@@ -59,6 +59,14 @@ from rewards.lift import (
 )
 from rewards.motion import roll_pitch_rate, vertical_velocity
 from rewards.posture import flat_orientation
+from rewards.pushing import (
+    object_at_target,
+    object_delivered,
+    object_progress,
+    object_reached,
+    object_regress,
+)
+from rewards.pushing_table import PUSH
 from rewards.recovery_table import RECOVERY
 from rewards.schedules import Constant, GeometricDecay, Schedule, StepSwitch
 from rewards.shaping import safe_norm, smoothstep, tracking_kernel
@@ -70,6 +78,7 @@ from rewards.tracking import track_planar_velocity, track_yaw_rate
 __all__ = [
     "CRAWL",
     "KEYBOARD",
+    "PUSH",
     "RECOVERY",
     "STOCK",
     "AirTimeMemory",
@@ -101,6 +110,11 @@ __all__ = [
     "lift_frequency_hz",
     "lift_gate",
     "lift_step",
+    "object_at_target",
+    "object_delivered",
+    "object_progress",
+    "object_reached",
+    "object_regress",
     "other_depth",
     "palm_tilt",
     "precomputed",

@@ -1,0 +1,61 @@
+"""The cube that is pushed: its body in the scene, and where episodes put it."""
+
+import jax
+import jax.numpy as jnp
+import mujoco
+from jaxtyping import Array, Float
+
+from envs.hand.spec import HAND_NQ, HAND_NV
+from envs.physics import PhysicsState
+from envs.rotations import about_z
+from envs.streams import stream
+
+CUBE = "cube"
+HALF_M = 0.020
+MASS_KG = 0.0414
+POS = slice(HAND_NQ, HAND_NQ + 3)
+QUAT = slice(HAND_NQ + 3, HAND_NQ + 7)
+VEL = slice(HAND_NV, HAND_NV + 3)
+"""Where position, orientation and velocity of the cube stand in `PhysicsState`."""
+
+_AWAY_M = 0.5
+_COLOUR = (0.35, 0.55, 0.30, 1.0)
+
+
+def add_cube(spec: mujoco.MjSpec, friction: float) -> None:
+    """Adds the cube of 40 mm and 41.4 g (paper), ahead of the hand.
+
+    Args:
+        spec: the scene.
+        friction: sliding friction on the floor; against a hand, the larger one counts.
+    """
+    cube = spec.worldbody.add_body(name=CUBE, pos=[_AWAY_M, 0, HALF_M])
+    cube.add_freejoint(name=CUBE)
+    cube.add_geom(
+        name=CUBE,
+        type=mujoco.mjtGeom.mjGEOM_BOX,
+        size=[HALF_M] * 3,
+        mass=MASS_KG,
+        friction=[friction, 0.005, 0.0001],
+        condim=3,
+        # Floor (1) and hand (2) look for it; a priority like the hand's, above floor's.
+        contype=0,
+        conaffinity=3,
+        priority=1,
+        rgba=_COLOUR,
+    )
+
+
+def place_cube(
+    key: Array, state: PhysicsState, pos_w: Float[Array, "2"]
+) -> PhysicsState:
+    """Puts the cube on the floor at rest, turned at random.
+
+    Args:
+        key: of the episode.
+        state: of the scene.
+        pos_w: where, on the floor [m].
+    """
+    turn = jax.random.uniform(stream(key, "cube_turn"), (), maxval=jnp.pi / 2)
+    pose = jnp.concatenate([pos_w, jnp.array([HALF_M]), about_z(turn)])
+    return state.replace(qpos=state.qpos.at[HAND_NQ : HAND_NQ + 7].set(pose))
