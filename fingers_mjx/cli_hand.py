@@ -1,4 +1,4 @@
-"""`fingers hand show` and `fingers hand stance`."""
+"""`fingers hand show`, `fingers hand stance` and `fingers hand mjcf`."""
 
 import argparse
 from pathlib import Path
@@ -7,18 +7,24 @@ from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.stance import settle, stance_json, stance_of
 from envs.hand.stance_search import search_stance
 from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.hand_mjcf import standing_mjcf
 
 
 def run(args: argparse.Namespace) -> int:
-    """Shows the hand or searches its stance."""
+    """Shows the hand, searches its stance or writes its model."""
     hand = load_hand_file(args.hand or DEFAULT_HAND_FILE)
     if args.action == "show":
         return _show(hand, args.out)
+    if args.action == "mjcf":
+        return _write(standing_mjcf(hand), args.out)
     qpos, target = search_stance(hand, args.seed, args.starts)
-    text = stance_json(settle(hand, qpos, target))
-    if args.out:
-        args.out.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(args.out, text.encode())
+    return _write(stance_json(settle(hand, qpos, target)), args.out)
+
+
+def _write(text: str, out: Path | None) -> int:
+    if out:
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_atomic(out, text.encode())
     else:
         print(text, end="")
     return 0

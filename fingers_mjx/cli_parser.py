@@ -230,7 +230,16 @@ def _hand(commands) -> None:
         help=f"random starts of the search (default {STANCE_STARTS})",
     )
     stance.add_argument("--out", type=Path, metavar="FILE", help="instead of stdout")
-    for action in (show, stance):
+    mjcf = actions.add_parser(
+        "mjcf",
+        help="write the hand as MJCF",
+        description="Writes the hand, standing, as one MJCF file: the model for "
+        "fingers-deploy run --driver sim, or to look at in any MuJoCo viewer.",
+    )
+    mjcf.add_argument(
+        "-o", "--out", type=Path, metavar="FILE", help="instead of stdout"
+    )
+    for action in (show, stance, mjcf):
         action.add_argument(
             "--hand", type=Path, metavar="FILE", help="default: the paper's hand"
         )

@@ -6,6 +6,7 @@ by the definitions of the ROS library, never by those that a file brings along.
 """
 
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
@@ -50,8 +51,18 @@ class BagMap:
     note: str = ""
 
 
-def read_bag(path: Path, bag_map: BagMap) -> MeasuredLog:
+OWN_TOPIC = "/fingers/log"
+OWN_MAP = BagMap(imu="/imu", effort="cur", mounting="free")
+"""Of the recordings of `fingers-deploy`, whose effort is a current."""
+
+
+def read_bag(path: Path, bag_map: BagMap | None = None) -> MeasuredLog:
     """Reads a log from the folder of a ROS 2 bag or from an MCAP file.
+
+    Args:
+        path: the folder or file.
+        bag_map: what it does not say; without one `BagMap()`, or for a recording of
+            `fingers-deploy`, which is known by its own topic, `OWN_MAP`.
 
     Raises:
         InputError: not such a file, a topic or joint that it lacks, messages of another
@@ -59,6 +70,10 @@ def read_bag(path: Path, bag_map: BagMap) -> MeasuredLog:
         ModuleNotFoundError: rosbags, of the optional dependencies `data`, is missing.
     """
     _check_folder(path)
+    if bag_map is None:
+        with _opened(path) as reader:
+            own = OWN_TOPIC in {connection.topic for connection in reader.connections}
+        bag_map = OWN_MAP if own else BagMap()
     rows = _Rows(path, bag_map)
     for topic, kind, received_ns, message in _messages(path, bag_map):
         rows.add(topic, kind, received_ns, message)
@@ -147,17 +162,25 @@ def _check_folder(path: Path) -> None:
 
 def _messages(path: Path, bag_map: BagMap) -> Iterator[tuple[str, str, int, Any]]:
     """Yields topic, type, time of reception [ns] and contents of the messages."""
-    from rosbags.rosbag2 import Reader
     from rosbags.typesys import Stores, get_typestore
 
     types = get_typestore(Stores.LATEST)
+    with _opened(path) as reader:
+        wanted = _connections(path, bag_map, reader.connections)
+        for connection, time_ns, data in reader.messages(wanted):
+            kind = connection.msgtype
+            message = types.deserialize_cdr(data, kind)
+            yield connection.topic, kind, time_ns, message
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    """Opens a bag; whatever fails while it is read is told in one sentence."""
+    from rosbags.rosbag2 import Reader
+
     try:
         with Reader(path) as reader:
-            wanted = _connections(path, bag_map, reader.connections)
-            for connection, time_ns, data in reader.messages(wanted):
-                kind = connection.msgtype
-                message = types.deserialize_cdr(data, kind)
-                yield connection.topic, kind, time_ns, message
+            yield reader
     except InputError:
         raise
     except ModuleNotFoundError:

@@ -19,7 +19,7 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     Args:
         path: `.csv`, `.parquet`, `.mcap`, or the folder of a ROS 2 bag.
         bag_map: topics, names and header of a bag or MCAP file, which says less than a
-            log needs.
+            log needs; the recordings of `fingers-deploy` need none.
 
     Raises:
         InputError: not such a file, or its contents are no log.
@@ -29,7 +29,7 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     if not file.exists():
         raise InputError(file, "", "no such file", _VALID)
     if file.is_dir() or file.suffix == ".mcap":
-        return read_bag(file, bag_map or BagMap())
+        return read_bag(file, bag_map)
     if bag_map is not None:
         raise InputError(
             file, "", "a map of topics", "one with a bag or MCAP file only"

@@ -14,7 +14,6 @@ import numpy as np
 import fingers_mjx
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
-from envs.hand.model import build_spec
 from envs.hand.stance import load_stance
 from fingers_deploy.bundle import Bundle
 from fingers_deploy.manifest import (
@@ -27,6 +26,7 @@ from fingers_deploy.manifest import (
     Term,
 )
 from fingers_mjx.bundle import encode_bundle, write_bundle
+from fingers_mjx.hand_mjcf import standing_mjcf
 from fingers_mjx.onnx_graph import PolicyWeights
 
 WALKING = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
@@ -45,11 +45,7 @@ TERMS = (
 
 def write_model(path: Path) -> Path:
     """Writes the calibrated hand in its stance as MJCF."""
-    stance = load_stance()
-    spec = build_spec(load_hand_file(), np.array(stance.q_off))
-    spec.add_key(name="stance", qpos=stance.qpos, ctrl=stance.target_rad)
-    spec.compile()
-    path.write_text(spec.to_xml(), "utf-8")
+    path.write_text(standing_mjcf(load_hand_file()), "utf-8")
     return path
 
 

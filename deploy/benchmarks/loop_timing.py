@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from fault_processes import plain_options
+from fault_processes import NEXT, plain_options
 from hand_files import WALKING, write_model
 from witness import Pauses, witnesses
 
@@ -32,7 +32,6 @@ from fingers_deploy.safety import Mode
 
 SAMPLE_S, CONTROL_S = 10.0, 0.02
 REACTION_S = 0.3  # a stop comes so long after the pause that it answers
-_NEXT = {"disabled": "arm", "stopping": "stop", "safe": "clear"}
 
 
 def _busy() -> None:
@@ -82,7 +81,7 @@ def operate(launcher: Launcher, seconds: float, each: Callable[[], None]) -> Non
     end = time.monotonic() + seconds
     while time.monotonic() < end and launcher.poll(0.2):
         each()
-        word = _NEXT.get(launcher.status.get("mode", ""))
+        word = NEXT.get(launcher.status.get("mode", ""))
         if word:
             launcher.send(word)
     launcher.send("quit")

@@ -5,6 +5,7 @@ lease, from the time at which that challenge was issued. A wrong or old answer r
 nothing. (Spot's E-stop works the same way.)
 """
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,7 +31,7 @@ class LeaseMemory:
         challenge: the newest challenge.
         issued: the challenges that may be answered, and when each was issued [s].
         renewed_s: issue time of the newest challenge that was answered rightly [s].
-        tick: control step of the last proposal that passed.
+        tick: control step up to which the targets on the wire have followed.
     """
 
     challenge: int = 0x9E3779B97F4A7C15
@@ -74,6 +75,16 @@ def detect_policy(
             found["S10"] = f"command {proposal.command_age_s:.2f} s old"
         _check_target(memory, proposal, target_rad, limits, found)
     return found
+
+
+def steps_behind(change_rad: Array, limits: Limits) -> int:
+    """Control steps of motion left over after one step of α toward a proposal.
+
+    A late policy answers twice at once; what the first answer asked for comes in the
+    second one, and the targets catch up over the next steps.
+    """
+    farthest = float(np.abs(change_rad).max()) - limits.step_tolerance_rad
+    return max(math.ceil(farthest / limits.step_rad) - 1, 0)
 
 
 def _check_target(

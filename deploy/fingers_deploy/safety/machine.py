@@ -20,7 +20,12 @@ from fingers_deploy.safety.detect_body import detect_tilt
 from fingers_deploy.safety.detect_health import detect_health
 from fingers_deploy.safety.detect_joints import JointMemory, detect_joints
 from fingers_deploy.safety.detect_loop import detect_loop
-from fingers_deploy.safety.detect_policy import LeaseMemory, detect_policy, renew_lease
+from fingers_deploy.safety.detect_policy import (
+    LeaseMemory,
+    detect_policy,
+    renew_lease,
+    steps_behind,
+)
 from fingers_deploy.safety.detect_sensors import (
     SensorMemory,
     detect_sensors,
@@ -238,7 +243,8 @@ def _targets(
     low, high = limits.allowed_rad[:, 0], limits.allowed_rad[:, 1]
     change = proposal.target_rad - state.target_rad
     target = state.target_rad + np.clip(change, -limits.step_rad, limits.step_rad)
-    lease = dataclasses.replace(state.lease, tick=proposal.tick)
+    tick = proposal.tick - steps_behind(change, limits)
+    lease = dataclasses.replace(state.lease, tick=tick)
     return dataclasses.replace(
         state, target_rad=np.clip(target, low, high), lease=lease
     )

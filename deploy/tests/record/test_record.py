@@ -90,8 +90,10 @@ def test_ros_tools_and_sysid_read_the_same_numbers(tmp_path):
 
 def test_identification_reads_a_recording_as_it_is(tmp_path):
     recorder, rows = _record(tmp_path, 60)
+    log = read_measured_log(recorder.files[0])
     topics = BagMap(imu="/imu", effort="cur", mounting="free")
-    log = read_measured_log(recorder.files[0], topics)
+    assert read_measured_log(recorder.files[0], topics).header == log.header
+    assert log.header.mounting == "free" and "tau" not in log.header.units
     assert log.header.joints == JOINTS
     for name, index in (("cmd", 6), ("pos", 6), ("cur", 6)):
         column = log.columns[f"{name}.finger2_joint3"]

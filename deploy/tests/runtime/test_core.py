@@ -8,16 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 from fault_lab import Lab
-from hand_files import marching_bundle
+from hand_files import WALKING, marching_bundle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fingers_deploy
+from fingers_deploy.bundle import load_bundle
 from fingers_deploy.record.row import ROW
 from fingers_deploy.runtime.core import Core
 from fingers_deploy.runtime.ticker import Tick
 from fingers_deploy.safety import Mode, Operator
 
+SEED = 7
 PACKAGE = Path(fingers_deploy.__file__).parent
 
 
@@ -87,6 +89,23 @@ def test_a_policy_process_cannot_choose_milder_limits(hand_model, marching):
     lab.core.selected = 1  # by the operator
     lab.run(0.1)
     assert lab.core.limits is recovering
+
+
+def test_a_policy_that_is_late_now_and_then_is_no_fault(hand_model):
+    """Two answers at once carry the motion of two steps: the targets catch up."""
+    lab = Lab(
+        hand_model, (load_bundle(WALKING),), sticks=(1.0, 0.0, 0.0), loop_hz=250
+    ).activate()
+    rng, step = np.random.default_rng(SEED), lab.core.limits.step_rad
+    lab.forget()
+    late = 0
+    for _ in range(300):
+        lab.link.delay_s = 0.0305 if rng.random() < 0.2 else 0.001
+        late += lab.link.delay_s > 0.02
+        lab.run(0.02)
+    targets = np.array([target for _, target in lab.driver.written])
+    assert late > 30 and lab.mode == Mode.ACTIVE, lab.events
+    assert np.abs(np.diff(targets, axis=0)).max() <= step + 1e-6
 
 
 def test_jumps_of_the_wall_clock_change_nothing(hand_model, marching, monkeypatch):
