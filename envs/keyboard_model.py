@@ -31,7 +31,7 @@ TOP_M = 0.030
 
 KEYBOARD = "keyboard"
 _CASE_HEIGHT_M, _BEZEL_M = 0.018, 0.006
-_CAP_M, _CAP_HEIGHT_M = 0.0135, 0.008
+_CAP_M, _CAP_HEIGHT_M, _CAP_FRICTION = 0.0135, 0.008, 0.4
 _MASS_KG, _ARMATURE_KG, _DAMPING = 0.002, 0.008, 1.0
 _HAND_BIT = 2  # what the hand's links collide with, see `envs.hand.model`
 _RIGID = {"solref": [0.01, 1.0], "solimp": [0.98, 0.99, 0.001, 0.5, 2.0]}
@@ -205,7 +205,7 @@ def _add_key(board: mujoco.MjsBody, key: Key) -> None:
         condim=3,
         # A light key under the hand's own soft contact would sink into the fingertip.
         priority=2,
-        friction=[0.8, 0.005, 0.0001],
+        friction=[_CAP_FRICTION, 0.005, 0.0001],
         rgba=[0.95, 0.95, 0.93, 1] if arrow else [0.62, 0.64, 0.67, 1],
         **_RIGID,
     )

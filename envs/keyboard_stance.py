@@ -20,7 +20,7 @@ FINGER_INDEX = FINGERS.index(FINGER)
 SUPPORTS = tuple(i for i in range(len(FINGERS)) if i != FINGER_INDEX)
 """The other fingers, by their place in `FINGERS`."""
 
-PLACEMENT = Placement(x_w=0.1338, y_w=0.0049, yaw_w=-0.780 - np.pi / 2)
+PLACEMENT = Placement(x_w=0.1335, y_w=0.0117, yaw_w=-0.7223 - np.pi / 2)
 """The keyboard for a hand in its stance, with the palm over the world's origin and V
 along world x."""
 
