@@ -116,8 +116,9 @@ def _train(commands) -> None:
     parser.add_argument(
         "--warm-start",
         type=Path,
-        metavar="RUN",
-        help="start from the networks of this run or checkpoint",
+        metavar="RUN|BUNDLE",
+        help="start from the networks of this run or checkpoint, or from the policy of "
+        "a bundle, which may be of another task",
     )
 
 

@@ -11,7 +11,6 @@ from envs.errors import InputError, one_of
 from envs.physics import BACKENDS, default_backend
 from envs.registry import get_task, task_names
 from fingers_mjx.ppo_config import TrainConfig, preset
-from fingers_mjx.ppo_policy import warm_started
 from fingers_mjx.ppo_state import train_template
 from fingers_mjx.progress import reporter
 from fingers_mjx.run_setup import (
@@ -23,6 +22,7 @@ from fingers_mjx.run_setup import (
     run_setup,
 )
 from fingers_mjx.train import train
+from fingers_mjx.warm_start import started_from
 
 _FOR_NEW_RUNS = ("hand", "out", "warm_start")
 
@@ -35,7 +35,7 @@ def run(args: argparse.Namespace) -> int:
     # Made here for its identity, and handed over: nothing is built twice.
     env = make_env(setup, setup.train.num_envs, setup.train.backend)
     if args.warm_start is not None:  # refused before anything is written
-        warm_started(train_template(env, setup.train.ppo), args.warm_start)
+        started_from(train_template(env, setup.train.ppo), env, args.warm_start)
     with reporter(sys.stdout) as show:
         show({"event": "note", "text": _headline(setup, path)})
         result = train(

@@ -12,7 +12,6 @@ from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
 from fingers_mjx.ppo_config import TrainConfig
 from fingers_mjx.ppo_config_check import check_config
-from fingers_mjx.ppo_policy import warm_started
 from fingers_mjx.ppo_rollout import BatchEnv
 from fingers_mjx.ppo_state import Carry, strong
 from fingers_mjx.progress import OnProgress, Ticker
@@ -21,6 +20,7 @@ from fingers_mjx.rundir_metrics import MetricsLog, read_metrics
 from fingers_mjx.train_cache import use_compile_cache
 from fingers_mjx.train_loop import Desk, Loop
 from fingers_mjx.train_session import Session, bound
+from fingers_mjx.warm_start import started_from
 
 TICK_S = 1.0
 """Time between two reports of compilation."""
@@ -65,8 +65,8 @@ def train(
             beside `config`, and a resumed run must share it.
         hand: written beside both.
         resume: go on from the newest intact checkpoint.
-        warm_start: run directory or checkpoint whose policy, critic and normalizer the
-            new run starts from; everything else starts afresh.
+        warm_start: run directory, checkpoint or bundle whose networks the new run
+            starts from (`fingers_mjx.warm_start`); everything else starts afresh.
         identity: JSON-able facts that a resumed run must share besides configuration
             and sizes, such as the hash of the model and the order of observations.
         on_progress: told the events of `fingers_mjx.progress`, from any thread.
@@ -128,5 +128,6 @@ def _fresh(session: Session, warm_start: Path | None) -> tuple[Carry, int, float
     """Returns the state of a new run, with the networks of `warm_start` if given."""
     carry = session.start()
     if warm_start is not None:
-        carry = replace(carry, train=warm_started(carry.train, warm_start))
+        started = started_from(carry.train, session.env, warm_start)
+        carry = replace(carry, train=strong(started))
     return carry, 0, 0.0
