@@ -293,4 +293,4 @@ SCENARIOS = (
     Scenario("L3", "supervisor away", _slow_driver, 0.100, HOLDING, 0.3),
     Scenario("L7", "clock back", _clock_back, 0.020, SAFE, 0.1),
 )  # fmt: skip
-"""S9, S13, S16, S17 and S20 are tested in other ways, see `fault_matrix`."""
+"""S9, S13, S16, S17, S20 are tested in other ways, see `fault_matrix`."""

@@ -1,5 +1,6 @@
 """The operator's console: typed actions in, plain lines out."""
 
+import math
 import os
 import select
 import signal
@@ -21,7 +22,7 @@ def drive(options: Mapping[str, Any], arm: bool, duration_s: float | None) -> in
     Args:
         options: of `runtime.launcher.Launcher`.
         arm: arm at once, as soon as everything is ready.
-        duration_s: quit after so long [s]; None: never.
+        duration_s: as for `Console`.
 
     Returns:
         The exit status.
@@ -44,7 +45,8 @@ class Console:
     Args:
         launcher: of the run.
         arm: arm as soon as everything is ready.
-        duration_s: quit after so long [s]; None: never.
+        duration_s: quit after so long [s], with `arm` counted from when the policy
+            begins; None: never.
     """
 
     def __init__(self, launcher: Launcher, arm: bool, duration_s: float | None):
@@ -71,16 +73,19 @@ class Console:
 
     def _step(self) -> None:
         now, mode = time.monotonic(), self._launcher.status.get("mode")
-        self._armed = self._armed or mode == "active"
+        if mode == "active" and self._arm and not self._armed:
+            self._armed, self._start_s = True, now
         if self._arm and mode == "disabled" and not self._armed:
             if now - self._start_s > _ARM_WITHIN_S:
                 self._quit()
             elif now - self._asked_s > _RETRY_S:
                 self._asked_s = now
                 self._launcher.send("arm")
-        if self._duration_s is not None and now - self._start_s > self._duration_s:
+        counts = self._armed or not self._arm
+        longest_s = math.inf if self._duration_s is None else self._duration_s
+        if counts and now - self._start_s > longest_s:
             self._quit()
-        if self._arm and self._armed and mode == "safe":
+        if self._arm and (mode == "safe" or (mode == "stopping" and not self._armed)):
             self._quit()
 
     def _quit(self) -> None:

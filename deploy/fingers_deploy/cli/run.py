@@ -2,14 +2,15 @@
 
 import argparse
 import contextlib
+import math
 from typing import Any
 
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.cli.console import drive
 from fingers_deploy.drivers.open import KINDS, open_driver
-from fingers_deploy.drivers.sim import SimulatorProcess
+from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import JOINT_COUNT
+from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_deploy.runtime.guard import make_safe
 
 WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
@@ -85,7 +86,20 @@ def run(options: argparse.Namespace) -> int:
             "heading_hold": heading
             and {"gain": heading[0], "offset_rad_s": heading[1]},
         }
-        return drive(plain, options.arm, options.duration)
+        status = drive(plain, options.arm, options.duration)
+        if options.driver == "sim":
+            _tell_distance(driver["socket"], bundles[0].manifest.interface)
+        return status
+
+
+def _tell_distance(socket: str, interface: Interface) -> None:
+    """Prints where the simulated hand is now; its origin is where it stood first."""
+    try:
+        x, y = where_the_palm_is(socket, interface)
+    except OSError:
+        return  # a simulator of the user's own that has ended
+    away_m = math.hypot(x, y)
+    print(f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)")
 
 
 def guard(options: argparse.Namespace) -> int:
@@ -139,7 +153,12 @@ def _add_loop(parser: argparse.ArgumentParser) -> None:
         action="store_true",
         help="arm at once; only in simulation, replay and dry runs",
     )
-    group.add_argument("--duration", type=float, help="stop after so many seconds")
+    group.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="stop after so many seconds, with --arm counted from the first step",
+    )
 
 
 def _driver(options: argparse.Namespace) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from fingers_deploy.reading import DriverInfo, Health, ImuReading, Reading
 from fingers_deploy.simulator.packets import STATE, Ask, request
 
 Array = NDArray[np.float64]
-_START_S = 30.0
+_START_S, _ANSWER_S = 30.0, 2.0
 TEMPERATURE_C, SUPPLY_V = 40.0, 14.8
 
 
@@ -118,6 +118,25 @@ class SimDriver:
         if len(data) != STATE.itemsize:
             raise ConnectionError("the simulator has gone")
         self._state = np.frombuffer(data, STATE)[0]
+
+
+def where_the_palm_is(path: str | Path, interface: Interface) -> tuple[float, float]:
+    """Asks a simulator in real time for the place of the palm on the floor [m].
+
+    Raises:
+        OSError: there is no simulator at this path, or none that answers.
+    """
+    driver = SimDriver(path, interface)
+    try:
+        deadline = time.monotonic() + _ANSWER_S
+        while driver.read() is None or driver.state is None:
+            if time.monotonic() > deadline:
+                raise TimeoutError("the simulator does not answer")
+            time.sleep(0.005)
+        x, y, _ = driver.state["base_pos"].tolist()
+        return x, y
+    finally:
+        driver.close()
 
 
 class SimulatorProcess:

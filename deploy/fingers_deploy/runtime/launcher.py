@@ -109,7 +109,8 @@ class Launcher:
         if status["alarm"]:
             self._say("CUT THE BATTERY: the hand does not confirm that it is off")
         if self._notify:
-            notify(self._notify, "WATCHDOG=1")
+            # Ready with the first status: from then on the watchdog counts.
+            notify(self._notify, "READY=1\nWATCHDOG=1")
 
     def _guard(self) -> None:
         driver_options = self._options["driver"]

@@ -95,7 +95,8 @@ def _pose(reading: Reading, limits: Limits) -> Check:
     low, high = limits.factory_rad[:, 0], limits.factory_rad[:, 1]
     beyond = np.maximum(low - reading.pos_rad, reading.pos_rad - high)
     worst = int(beyond.argmax())
-    words = f"joint {worst} {max(beyond[worst], 0.0):.3f} rad outside its limits"
+    outside = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
+    words = outside if beyond[worst] > 0 else "every joint inside"
     passed = valid_joints(reading) and bool(beyond[worst] <= _OUTSIDE_RAD)
     return Check("pose within limits", passed, words)
 

@@ -9,6 +9,7 @@ from fuzz_bundles import measure as damage_bundles
 
 from fingers_deploy.cli.main import main
 from fingers_deploy.record import read_log
+from fingers_deploy.safety import Mode
 
 
 def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
@@ -92,7 +93,7 @@ def recorded(hand_model, marching_dir, tmp_path_factory):
     """A whole run from the command line: processes, socket, recording."""
     out = tmp_path_factory.mktemp("run")
     arguments = ["run", marching_dir, "--driver", "sim", "--model", hand_model, "--arm"]
-    arguments += ["--wiggle", "one", "--duration", "6", "--sticks", "1", "0", "0"]
+    arguments += ["--wiggle", "one", "--duration", "3", "--sticks", "1", "0", "0"]
     done = _run(*arguments, "--out", out)
     return done, next(out.glob("*.mcap"))
 
@@ -107,6 +108,8 @@ def test_a_run_from_the_command_line(recorded):
     # A loaded machine may stop the hand, never crash: 0, or 5 and a fault's name.
     assert done.returncode == 0 or (done.returncode == 5 and "-> hold" in done.stdout)
     assert "control steps" in done.stdout
+    assert "m from the origin" in done.stdout.splitlines()[-1]
+    assert (log.rows["mode"] == Mode.ACTIVE).any()
 
 
 def test_a_recording_converts_to_csv(recorded, tmp_path, capsys):
