@@ -1,12 +1,15 @@
 """Fall recovery: get up from the thumb side or the wrist side into the crawl stance."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import flax.struct
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Int
 
+from envs.base import State
 from envs.commands import CommandConfig, sample_command
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
@@ -14,17 +17,23 @@ from envs.hand_env import HandEnv
 from envs.hand_settings import HandSettings
 from envs.hand_task import BareTask
 from envs.memory import Lasting, Memory
-from envs.physics import PhysicsState
+from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
-from envs.recovery_falls import Falls, falls_of
+from envs.recovery_falls import SIDES, Falls, falls_of
+from envs.recovery_measures import recovery_measures
+from envs.recovery_settle import (
+    Settle,
+    Settling,
+    action_toward,
+    level_and_calm,
+    start_settling,
+    tilt_rad,
+)
 from envs.rotations import about_z, multiply, unrotate
 from envs.scoring import check_weights
 from envs.signals import Signals
 from envs.streams import stream
-from rewards import RECOVERY, RewardTable, safe_norm
-
-UPRIGHT_TILT_DEG = 10.0
-UPRIGHT_SPEED_RPS = 4.0
+from rewards import RECOVERY, RewardTable
 
 
 def _no_command() -> CommandConfig:
@@ -40,9 +49,13 @@ class RecoveryConfig(HandSettings):
     Attributes:
         command: the planar and yaw commands that the policy sees, as a crawl policy
             does (paper); nothing is paid for following them.
+        settle: whether, as on the hand, the joint targets are taken to the stance once
+            the upright detector has fired. Evaluations do so; in training the policy
+            goes on, so that it learns to stay up (paper).
     """
 
     command: CommandConfig = field(default_factory=_no_command)
+    settle: bool = False
     # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
     # 14 contacts under random actions, and Warp's pool also holds the near pairs.
     contacts_per_world: int = field(default=96, metadata={"low": 1})
@@ -50,6 +63,19 @@ class RecoveryConfig(HandSettings):
     def __post_init__(self) -> None:
         super().__post_init__()
         check_weights(RECOVERY, self.weights)
+
+
+@flax.struct.dataclass
+class RecoveryMemory:
+    """What an episode carries.
+
+    Attributes:
+        side: side on which the hand fell, a position in `SIDES`.
+        settling: upright detector and settle ramp.
+    """
+
+    side: Int[Array, "*b"]
+    settling: Settling
 
 
 @dataclass(frozen=True)
@@ -76,16 +102,24 @@ class Recovery(BareTask):
     def begin_episode(
         self, key: Array, lasting: Lasting, state: PhysicsState
     ) -> dict[str, Any]:
-        """The command of the whole episode."""
+        """The command of the whole episode, the side of the fall, and no settling."""
         del lasting, state
-        return {"command": sample_command(key, self.config.command)}
+        sides = jnp.array([list(SIDES).index(side) for side in self.falls.side])
+        settling = start_settling(len(self.stance.target_rad))
+        return {
+            "command": sample_command(key, self.config.command),
+            "task": RecoveryMemory(sides[self._drawn(key)], settling),
+        }
 
     def start(
         self, key: Array, plant: Plant, lasting: Lasting
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
-        """One of the fallen poses at rest, at a random heading, under its targets."""
-        count = len(self.falls.side)
-        fall = jax.random.randint(stream(key, "fall"), (), 0, count)
+        """One of the fallen poses at rest, at a random heading.
+
+        The joint targets are the joint angles: the motors were off and are energized
+        where the joints are (paper), so that nothing pushes at first.
+        """
+        fall = self._drawn(key)
         turn = jax.random.uniform(
             stream(key, "heading"), (), minval=-jnp.pi, maxval=jnp.pi
         )
@@ -93,7 +127,33 @@ class Recovery(BareTask):
         quat_w = multiply(about_z(turn), pose[3:7])
         qpos = jnp.concatenate([pose[:3], quat_w, pose[7:]])
         rest = jnp.zeros(plant.mj_model.nv)
-        return PhysicsState(qpos, rest, rest), jnp.array(self.falls.target_rad)[fall]
+        target = jnp.clip(pose[7:], *plant.joint_range.T)
+        return PhysicsState(qpos, rest, rest), target
+
+    def scene_signals(
+        self,
+        plant: Plant,
+        carried: Mapping[str, Any],
+        signals: Signals,
+        output: PhysicsOutput,
+    ) -> dict[str, Array]:
+        """How near the stance the hand is, and how far its recovery has come.
+
+        `tilt_rad_v` [rad] and `joint_error_rad`, the mean of |q − q*| [rad], tell the
+        former; `settling` is 1 once the upright detector has fired, `settled` once the
+        ramp is over, and `fall_side` a position in `SIDES`.
+        """
+        del plant, output
+        memory = carried["task"]
+        error = jnp.abs(signals.joint_pos - jnp.array(self.stance.joint_pos_rad))
+        settled = self.settle.over(memory.settling, carried["steps"])
+        return {
+            "tilt_rad_v": tilt_rad(self.stance.q_off, signals.gravity_b),
+            "joint_error_rad": jnp.mean(error),
+            "settling": memory.settling.begun.astype(jnp.float32),
+            "settled": settled.astype(jnp.float32),
+            "fall_side": memory.side,
+        }
 
     def magnitudes(
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
@@ -123,15 +183,32 @@ class Recovery(BareTask):
         `upright` is 1 where the stance-relative tilt is below 10° and the angular speed
         below 4 rad/s (paper, upright detector, which asks for 0.5 s of it).
         """
-        tilt_deg = jnp.rad2deg(_angle_to_level(self._gravity_v(signals)))
-        level = tilt_deg < UPRIGHT_TILT_DEG
-        calm = safe_norm(signals.angvel_b) < UPRIGHT_SPEED_RPS
-        error = jnp.abs(signals.joint_pos - jnp.array(self.stance.joint_pos_rad))
+        upright = level_and_calm(self.stance.q_off, signals.gravity_b, signals.angvel_b)
         return {
-            "upright": (level & calm).astype(jnp.float32),
-            "tilt_deg": tilt_deg,
-            "joint_error_rad": jnp.mean(error),
+            "upright": upright.astype(jnp.float32),
+            "tilt_deg": jnp.rad2deg(signals.extra["tilt_rad_v"]),
+            "joint_error_rad": signals.extra["joint_error_rad"],
         }
+
+    def episode_measures(
+        self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
+    ) -> dict[str, Float[Array, ""]]:
+        """Righted, how fast and how near the stance; over all falls and per side."""
+        return recovery_measures(recorded, counts, self.config.control_dt_s)
+
+    @property
+    def settle(self) -> Settle:
+        """Upright detector and settle ramp of this stance."""
+        return Settle(
+            self.stance.target_rad,
+            self.stance.q_off,
+            self.config.control_dt_s,
+            self.config.action_scale_rad,
+        )
+
+    def _drawn(self, key: Array) -> Int[Array, ""]:
+        """Number of the pose that an episode starts from."""
+        return jax.random.randint(stream(key, "fall"), (), 0, len(self.falls.side))
 
     def _gravity_v(self, signals: Signals) -> Float[Array, "3"]:
         return unrotate(jnp.array(self.stance.q_off), signals.gravity_b)
@@ -158,7 +235,25 @@ class RecoveryEnv(HandEnv):
         task = Recovery(config or RecoveryConfig(), stance, falls_of(hand, stance))
         super().__init__(task, backend, num_worlds, hand, stance)
 
+    def step(self, state: State, action: Float[Array, "20"]) -> State:
+        """Advances one control step; see `RecoveryConfig.settle`."""
+        if self.config.settle:
+            state, action = self._settled(state, action)
+        return super().step(state, action)
 
-def _angle_to_level(gravity_v: Float[Array, "3"]) -> Float[Array, ""]:
-    """Angle between the upward axis of V and the vertical [rad], in [0, π]."""
-    return jnp.arctan2(safe_norm(gravity_v[:2]), -gravity_v[2])
+    def _settled(
+        self, state: State, action: Float[Array, "20"]
+    ) -> tuple[State, Float[Array, "20"]]:
+        """Puts the ramp's motion in the place of the policy's, once it is upright."""
+        memory, config, settle = state.memory, self.config, self.task.settle
+        scale, clip = config.action_scale_rad, config.action_clip
+        action = jnp.clip(action, -clip, clip)
+        proposed = self.plant.next_target(memory.target, action, scale)
+        told = jax.tree.map(lambda x: x[-1], memory.history)
+        settling, target = settle.step(
+            memory.task.settling, told.gravity, told.angvel, proposed, memory.steps
+        )
+        ramped = action_toward(memory.target, target, scale, clip)
+        action = jnp.where(memory.task.settling.begun, ramped, action)
+        task = memory.task.replace(settling=settling)
+        return state.replace(memory=memory.replace(task=task)), action

@@ -12,6 +12,7 @@ from fingers_mjx.cli_table import print_measures
 from fingers_mjx.cli_train import check_backend
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import (
+    as_deployed,
     check_policy_settings,
     document,
     evaluate_source,
@@ -48,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _setup(args: argparse.Namespace, setup: Setup) -> Setup:
     """Returns what is simulated: the policy's own task, changed as asked."""
-    setup = nominal(setup) if args.nominal else setup
+    setup = as_deployed(nominal(setup) if args.nominal else setup)
     for command in args.commands or ():
         setup = with_command(setup, command)
     return overridden(setup, args.settings)

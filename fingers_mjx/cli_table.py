@@ -8,17 +8,19 @@ from rich.table import Table
 
 
 def print_measures(summary: Mapping[str, Any]) -> None:
-    """Prints the measures of a summary with their 95 % intervals on stdout."""
+    """Prints the measures of a summary with their 95 % intervals and percentiles."""
     title = f"{summary['policy']}: {summary['episodes']} episodes of {summary['task']}"
     table = Table(title=title, title_justify="left", box=None, pad_edge=False)
     table.add_column("measure")
-    for name in ("mean", "95 % interval", "std", "n"):
+    for name in ("mean", "95 % interval", "std", "median", "95th %", "n"):
         table.add_column(name, justify="right")
     for name, measure in summary["measures"].items():
         ends = (_text(measure["low"]), _text(measure["high"]))
         interval = "–" if measure["low"] is None else f"{ends[0]} – {ends[1]}"
-        figures = (_text(measure["mean"]), interval, _text(measure["std"]))
-        table.add_row(name, *figures, str(measure["n"]))
+        spread = (_text(measure[key]) for key in ("std", "median", "p95"))
+        table.add_row(
+            name, _text(measure["mean"]), interval, *spread, str(measure["n"])
+        )
     Console(soft_wrap=True, highlight=False).print(table)
 
 

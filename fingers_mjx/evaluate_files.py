@@ -76,8 +76,9 @@ def summary_document(
     """Returns the summary of an evaluation as plain values for JSON.
 
     Keys: task, policy, episodes, seed, steps_trained, commit (if known) and measures,
-    which maps each name to mean, std, n, low and high (95 % interval). An undefined
-    number, such as the mean of no episodes, is None.
+    which maps each name to mean, std, n, low and high (95 % interval of the mean),
+    median and p95 (95 % of the episodes are at most there). An undefined number, such
+    as the mean of no episodes, is None.
 
     Args:
         columns: measure name to one value per episode.

@@ -41,6 +41,16 @@ def nominal(setup: Setup) -> Setup:
     return dataclasses.replace(setup, env=env)
 
 
+def as_deployed(setup: Setup) -> Setup:
+    """Returns `setup` with what the shim does beside the policy.
+
+    Of a recovery it is the end: detector and ramp (`envs.recovery_settle`).
+    """
+    if not hasattr(setup.env, "settle"):
+        return setup
+    return dataclasses.replace(setup, env=dataclasses.replace(setup.env, settle=True))
+
+
 def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     """Returns `setup` with one command for all of every episode.
 

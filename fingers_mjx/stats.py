@@ -20,8 +20,10 @@ class Summary:
         mean: of the defined values; NaN if there are none.
         std: sample standard deviation (n - 1); NaN below two values.
         n: how many values are defined (not NaN).
-        low: lower end of the confidence interval; NaN below two values.
+        low: lower end of the confidence interval of the mean; NaN below two values.
         high: upper end.
+        median: half of the defined values are at most this.
+        p95: 95 % of the defined values are at most this.
     """
 
     mean: float
@@ -29,6 +31,8 @@ class Summary:
     n: int
     low: float
     high: float
+    median: float
+    p95: float
 
 
 def summarize(
@@ -140,7 +144,8 @@ def _summary(defined: np.ndarray, interval: tuple[float, float]) -> Summary:
     count = len(defined)
     mean = float(defined.mean()) if count else np.nan
     spread = float(defined.std(ddof=1)) if count > 1 else np.nan
-    return Summary(mean, spread, count, *interval)
+    halves = np.percentile(defined, (50, 95)).tolist() if count else [np.nan] * 2
+    return Summary(mean, spread, count, *interval, *halves)
 
 
 def _wilson(values: np.ndarray, confidence: float) -> tuple[float, float]:

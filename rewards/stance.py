@@ -5,8 +5,9 @@ from jaxtyping import Array, Float
 
 from rewards.shaping import Scalar, tracking_kernel
 
-HEIGHT_WIDTH_M = 0.05
-"""Width of the height kernel [m]; ours."""
+HEIGHT_WIDTH_M = 0.10
+"""Width of the height kernel [m]; ours. A palm on the floor is 0.1 m too low: with half
+of this width, rising from there would pay nothing."""
 
 POSE_WIDTH_RAD = 0.5
 """Width of the pose kernel as a root mean square over the joints [rad]; ours."""

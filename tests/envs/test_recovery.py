@@ -10,6 +10,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.stance import stance_of
+from envs.randomize import no_randomization
 from envs.recovery import RecoveryConfig, RecoveryEnv
 from envs.recovery_falls import (
     POSES_PER_SIDE,
@@ -109,8 +110,9 @@ def test_starts_draw_every_fall_at_every_heading(recovery):
     joints = np.asarray(env.task.falls.qpos, np.float32)[:, 7:]
     drawn = np.abs(states.qpos[:, None, 7:] - joints).max(axis=2).argmin(axis=1)
     assert len(np.unique(drawn)) == len(joints)
-    held = np.asarray(env.task.falls.target_rad, np.float32)[drawn]
-    np.testing.assert_array_equal(targets, held)
+    # The motors are energized where the joints are.
+    limits = np.asarray(env.plant.joint_range)
+    np.testing.assert_array_equal(targets, np.clip(joints[drawn], *limits.T))
     assert not np.asarray(states.qvel).any()
     pose = np.asarray(env.task.falls.qpos)[drawn, 3:7] * [1, -1, -1, -1]
     turn = jax.vmap(multiply)(states.qpos[:, 3:7], jnp.asarray(pose))
@@ -140,6 +142,33 @@ def test_the_stance_is_upright_and_pays_most(recovery):
     assert (np.asarray(stood.metrics["joint_error_rad"]) < 0.03).all()
     assert (np.asarray(stood.reward) > np.asarray(fallen.reward) + 0.02).all()
     assert (np.asarray(stood.reward) > 0.9 * 3 * 0.02).all()
+
+
+def test_settling_takes_an_upright_hand_to_the_stance_whatever_the_policy_does():
+    config = RecoveryConfig(settle=True, randomize=no_randomization(0.8))
+    batch = make_batch("recovery", 2, config, auto_reset=False)
+    start = jax.jit(batch.reset)(jax.random.key(5))
+    # Its sensors tell of the stance from the second step on.
+    states = [in_stance(start, batch.stance)]
+    states[0] = states[0].replace(
+        data=states[0].data.replace(
+            qpos=states[0].data.qpos.at[1].set(start.data.qpos[1])
+        )
+    )
+    step, nod = jax.jit(batch.step), np.zeros((2, 20), np.float32)
+    nod[:, ::4] = -0.1  # slowly bends the fingers
+    for _ in range(125):
+        states.append(step(states[-1], nod))
+    begun = np.array([state.signals.extra["settling"] for state in states[1:]])
+    over = np.array([state.signals.extra["settled"] for state in states[1:]])
+    assert begun[:, 0].argmax() == 26 and begun[26:, 0].all()
+    assert over[:, 0].argmax() == 26 + 75
+    assert not begun[:, 1].any() and not over[:, 1].any()  # it still lies there
+    bent, settled = (np.asarray(states[k].memory.target)[0] for k in (27, -1))
+    stance = np.asarray(batch.stance.target_rad)
+    assert np.abs(bent - stance).max() > 0.1
+    np.testing.assert_allclose(settled, stance, atol=1e-6)
+    assert states[-1].signals.extra["joint_error_rad"][0] < 0.01
 
 
 @pytest.mark.parametrize(("speed_rps", "upright"), [(2.0, 1), (6.0, 0)])

@@ -55,11 +55,13 @@ def test_summary_has_what_readers_rely_on(tmp_path):
     }
     assert measures.keys() == COLUMNS.keys()
     speed = measures["task_speed_mps"]
-    assert speed.keys() == {"mean", "std", "n", "low", "high"}
+    assert speed.keys() == {"mean", "std", "n", "low", "high", "median", "p95"}
     assert speed["n"] == 3
     np.testing.assert_allclose([speed["mean"], speed["std"]], [0.2, 0.1])
     assert measures["survival"]["mean"] == 0.75
-    undefined = {"mean": None, "std": None, "n": 0, "low": None, "high": None}
+    undefined = dict.fromkeys(("mean", "std", "low", "high", "median", "p95")) | {
+        "n": 0
+    }
     assert measures["mean_contact_tilt_deg"] == undefined
     assert "commit" not in summary_document(COLUMNS, "crawl", "bundle", 3, 1_000)
 

@@ -18,6 +18,7 @@ def test_mean_spread_and_count_of_known_numbers():
     assert (found.mean, found.n) == (3.0, 4)
     np.testing.assert_allclose(found.std, np.sqrt(14 / 3))
     assert found.low < 3.0 < found.high
+    assert (found.median, found.p95) == (2.5, pytest.approx(5.55))
 
 
 def test_interval_approaches_the_normal_one():

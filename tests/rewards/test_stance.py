@@ -18,8 +18,8 @@ def test_palm_tilt_grows_to_upside_down(tilt_deg, value):
 
 def test_height_falls_to_its_width():
     at = rewards.stance_height(jnp.array(0.127), jnp.array(0.127))
-    below = rewards.stance_height(jnp.array(0.077), jnp.array(0.127))
-    above = rewards.stance_height(jnp.array(0.177), jnp.array(0.127))
+    below = rewards.stance_height(jnp.array(0.027), jnp.array(0.127))
+    above = rewards.stance_height(jnp.array(0.227), jnp.array(0.127))
     assert at == 1.0
     assert below == pytest.approx(np.exp(-1), rel=1e-5) == above
 

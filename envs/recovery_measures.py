@@ -1,0 +1,56 @@
+"""What a whole recovery is measured by: righted, how fast, how near the stance."""
+
+import math
+from collections.abc import Mapping
+
+import jax.numpy as jnp
+from jaxtyping import Array, Bool, Float
+
+from envs.recovery_falls import SIDES
+from envs.recovery_settle import UPRIGHT_TILT_DEG
+
+MAX_TILT_RAD = math.radians(UPRIGHT_TILT_DEG)
+
+
+def recovery_measures(
+    recorded: Mapping[str, Array], counts: Bool[Array, " T"], dt_s: float
+) -> dict[str, Float[Array, ""]]:
+    """Measures of one episode, over all falls and again for each side.
+
+    `righted` is 1 if the detector fired and the hand is still level (tilt < 10°) when
+    the episode ends, `time_to_upright_s` the time at which the detector fired, its
+    0.5 s included, and `final_joint_error_rad` the mean of |q − q*| over the joints at
+    the end. The last two are NaN where the detector did not fire, the last one also
+    where the ramp was not over by the end of the episode.
+
+    Args:
+        recorded: the signals of `envs.recovery.Recovery.scene_signals` over the
+            control steps.
+        counts: the steps that count.
+        dt_s: control interval [s].
+
+    Source:
+        Paper, fall recovery; that the hand must still be level is ours.
+    """
+    last = jnp.argmax(jnp.cumsum(counts))
+    fired = (recorded["settling"] > 0) & counts
+    done = jnp.any(fired)
+    settled = done & (recorded["settled"][last] > 0)
+    error, tilt = recorded["joint_error_rad"][last], recorded["tilt_rad_v"][last]
+    found = {
+        "righted": (done & (tilt < MAX_TILT_RAD)).astype(jnp.float32),
+        "time_to_upright_s": jnp.where(done, jnp.argmax(fired) * dt_s, jnp.nan),
+        "final_joint_error_rad": jnp.where(settled, error, jnp.nan),
+    }
+    return found | _per_side(found, recorded["fall_side"][0])
+
+
+def _per_side(
+    found: Mapping[str, Array], side: Float[Array, ""]
+) -> dict[str, Float[Array, ""]]:
+    """The same again under the name of the side, NaN for falls on the other."""
+    return {
+        f"{name}_{which}": jnp.where(side == index, value, jnp.nan)
+        for index, which in enumerate(SIDES)
+        for name, value in found.items()
+    }
