@@ -6,6 +6,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+from fingers_mjx.cli_parser_sysid import add_excite
+
 MAX_SEED = 2**32 - 1
 STANCE_STARTS = 40
 """Starts with which the stored stance was found."""
@@ -258,6 +260,7 @@ def _sysid(commands) -> None:
     info.add_argument(
         "--map", type=Path, metavar="FILE", help="topics and names of a bag, as YAML"
     )
+    add_excite(actions, whole, number)
 
 
 def _demo(commands) -> None:

@@ -1,7 +1,9 @@
 """A stand as the product's mechanism, and the truth in the product's terms."""
 
+from dataclasses import replace
+
 from hidden.cases import Case
-from hidden.plant import build
+from hidden.plant import ROTOR_SHARE, build
 from hidden.stands import TOLERANCES, Stand
 from hidden.truth import Joint
 
@@ -12,7 +14,9 @@ def believed(stand: Stand) -> Mechanism:
     """Returns what a user would hand over together with the log."""
     joints = stand.mechanism.joints
     drives = {n: _drive(j) for n, j in zip(stand.names, joints, strict=True)}
-    return model_mechanism(build(stand.mechanism).model, drives)
+    # How the stand is turned is in the header of its log.
+    upright = replace(stand.mechanism, base_quat_w=(1.0, 0.0, 0.0, 0.0))
+    return model_mechanism(build(upright).model, drives)
 
 
 def _drive(joint: Joint) -> JointDrive:
@@ -53,4 +57,25 @@ def true_parameters(case: Case, effect: str) -> dict[str, float]:
         case "armature":
             extra = true.armature - believed_.armature
             return {"inertia_kgm2": values["inertia_kgm2"] + extra}
+        case "thermal_derating":
+            cool = values["cooling_per_s"]
+            loss = values["fall_per_nm2s"] / cool
+            return {"loss_per_nm2": loss, "time_constant_s": 1.0 / cool}
+        case "supply_sag":
+            return {"sag_per_nm": values["per_nm"]}
+        case "compliance":
+            return {
+                "compliance_rad_nm": 1.0 / values["stiffness_nm_rad"],
+                "motor_inertia_kgm2": ROTOR_SHARE * true.armature,
+            }
+        case "joint_coupling":
+            return {"stiffness_nm_rad": -values["stiffness_nm_rad"]}
+        case "clock_drift":
+            return {"drift_ppm": -1e6 * values["drift"]}
+        case "payload_mass":
+            return {"mass_kg": case.truth.payload_kg[index]}
+        case "mount_tilt" if case.stand.kind == "pendulum":
+            return {"pitch_rad": -values["angle_rad"]}
+        case "mount_tilt":
+            return {}
     return dict(values)

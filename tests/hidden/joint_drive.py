@@ -3,7 +3,9 @@
 import math
 from bisect import bisect_right
 
+import numpy as np
 from hidden.truth import Joint
+from scipy.stats import gamma
 
 PRESLIDING_RAD = 2e-4
 """How far dry friction gives before it slips."""
@@ -81,8 +83,9 @@ class JointDrive:
         error = self.command - self.encoder(q)
         if self.zone:
             error -= min(max(error, -self.zone), self.zone)
-        strength *= 1.0 - min(self.warmth, 0.95)
-        torque = self.kp * strength * error - self.kd * self._encoder_speed(q, v)
+        strength /= 1.0 + self.warmth
+        torque = self.kp * error - self.kd * self._encoder_speed(q, v)
+        torque *= strength
         torque = min(max(torque, -self.limit), self.limit)
         if self.slope < math.inf:
             rise = self.slope * self.h
@@ -171,10 +174,10 @@ class _Jenkins:
     def __init__(self, joint: Joint):
         value = joint.value
         self.size = value("hysteresis", "torque_nm", 0.0)
-        reach = value("hysteresis", "reach_rad", 1.0)
-        # Slip distances at quantiles of an exponential law, as Dahl's curve has.
-        n = 12
-        self.slip = [-reach * math.log(1.0 - (i + 0.5) / n) for i in range(n)]
+        reach = value("hysteresis", "range_rad", 1.0)
+        # Slip distances whose sum is Dahl's curve 1 − exp(−x / reach) on first loading.
+        quantiles = (np.arange(16) + 0.5) / 16
+        self.slip = (reach * gamma.ppf(quantiles, 2.0)).tolist()
         self.anchor: list[float] | None = None
 
     def force(self, q: float) -> float:

@@ -84,7 +84,7 @@ def _run(mechanism, plant, data, drives, steps: int, h: float) -> Motion:
         for i, drive, link, motor in pairs:
             applied[link] += forces[i]
             applied[motor] += drive.torque
-        strength = 1.0 - min(mechanism.sag_per_nm * total, 0.95)
+        strength = 1.0 / (1.0 + mechanism.sag_per_nm * total / strength)
         mujoco.mj_step(model, data)
     return Motion(h * np.arange(steps), out[:, 0], out[:, 1], out[:, 2], out[:, 3])
 

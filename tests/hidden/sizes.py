@@ -189,7 +189,7 @@ SCALES: dict[str, Scale] = {
     "backlash": Scale(_effect("backlash", gap_rad=_size), 1e-4, 0.2),
     "compliance": Scale(_compliance, 1e-3, 2.0),
     "hysteresis": Scale(
-        _effect("hysteresis", torque_nm=_size, reach_rad=_uniform(0.02, 0.06)),
+        _effect("hysteresis", torque_nm=_size, range_rad=_uniform(0.02, 0.06)),
         1e-4,
         0.5,
     ),

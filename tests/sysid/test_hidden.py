@@ -127,7 +127,7 @@ def test_bristles_slip_at_the_stribeck_curve():
 
 
 def test_hysteresis_takes_energy_in_every_closed_loop_and_is_bounded():
-    joint = servo(hysteresis={"torque_nm": 0.03, "reach_rad": 0.02}).joints[0]
+    joint = servo(hysteresis={"torque_nm": 0.03, "range_rad": 0.02}).joints[0]
     for size in (0.001, 0.02, 0.3):
         loop = _Jenkins(joint)
         q = size * np.sin(np.linspace(0.0, 4.0 * math.pi, 4001))
@@ -155,7 +155,14 @@ def test_warm_motors_settle_at_their_heat_balance():
     motion = held(servo(WEIGHT, thermal_derating=heat), 1.2, 5.0)
     torque, angle = motion.torque[-1, 0], motion.angle[-1, 0]
     strength = torque / (KP * (1.2 - angle))
-    assert 1.0 - strength == pytest.approx(2.0 * torque**2 / 4.0, rel=0.01)
+    assert 1.0 / strength - 1.0 == pytest.approx(2.0 * torque**2 / 4.0, rel=0.01)
+
+
+def test_a_supply_sags_by_what_is_asked_of_it():
+    weak = replace(servo(WEIGHT), sag_per_nm=2.0)
+    motion = held(weak, 1.2, 2.0)
+    asked = KP * (1.2 - motion.angle[-1, 0])
+    assert motion.torque[-1, 0] == pytest.approx(asked / (1.0 + 2.0 * asked), rel=0.01)
 
 
 def test_encoders_and_loads_by_their_static_error():

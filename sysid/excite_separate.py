@@ -1,0 +1,374 @@
+"""Which effects a plan can show, and which it can tell apart, from the model itself.
+
+Every effect is simulated at a small size on the plan's own targets. With the change y
+of the record, in deviations of its noise, and the changes S that known figures make
+when they move by their tolerances,
+
+    seen(y)     = min_s ‖y − S s‖² + ‖s‖²
+    apart(a, b) = min_{s,c} ‖y_a − c y_b − S s‖² + ‖s‖²
+
+half of which is the evidence in nat that the effect is there, and that it is a and not
+b at any size c. Evidence grows with the square of the size: so it tells the smallest
+size that shows, and what could stand for an effect that is barely clear. Nothing is
+looked up: another plan, load or gain gives other figures.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from envs.hand.effects.base import EffectKind
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.hand.effects.joint import joint_step
+from envs.hand.effects.surroundings import Gravity, Surroundings
+from envs.quiet_mujoco import mujoco
+from sysid.excite import Plan, joint_address
+from sysid.excite_check import STEP_S
+from sysid.mechanism import JointDrive, Mechanism
+
+NEEDED_NAT = 6.0
+"""Evidence from which on an effect counts as seen, or as told apart."""
+
+SETTLE_ROWS = 100
+"""Rows at the first targets before the record begins: what an effect does at rest."""
+
+NO_LIMIT = 1e6
+"""Stands for infinity in parameters whose effect vanishes there."""
+
+CLEAR_NAT = 100.0
+"""Evidence of an effect at the size at which rivals are compared with it, at most."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """What readings scatter by [rad], [N·m]; an infinite effort is not logged."""
+
+    angle_rad: float = 1e-3
+    torque_nm: float = 5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Separation:
+    """What a plan shows of one joint.
+
+    Attributes:
+        joint: its name.
+        effects: names in order.
+        sizes: parameters of each effect: as simulated so far, and as tried.
+        seen_nat: evidence that it is there.
+        apart_nat: evidence for the effect of the row against that of the column, where
+            the first is so large that its own evidence is at most `CLEAR_NAT`.
+    """
+
+    joint: str
+    effects: tuple[str, ...]
+    sizes: Mapping[str, Mapping[str, tuple[float, float]]]
+    seen_nat: Float[np.ndarray, " e"]
+    apart_nat: Float[np.ndarray, "e e"]
+
+    @property
+    def seen(self) -> tuple[str, ...]:
+        """Effects that show at the size tried."""
+        pairs = zip(self.effects, self.seen_nat, strict=True)
+        return tuple(name for name, nat in pairs if nat >= NEEDED_NAT)
+
+    @property
+    def smallest(self) -> dict[str, float]:
+        """Size that just shows as share of the one tried, infinite for none."""
+        with np.errstate(divide="ignore"):
+            shares = np.sqrt(NEEDED_NAT / self.seen_nat)
+        return dict(zip(self.effects, map(float, shares), strict=True))
+
+    def confused(self, effect: str) -> tuple[str, ...]:
+        """Returns the effects that could stand for this one."""
+        row = self.apart_nat[self.effects.index(effect)]
+        pairs = zip(self.effects, row, strict=True)
+        seen = self.seen
+        return tuple(
+            n for n, nat in pairs if n != effect and nat < NEEDED_NAT and n in seen
+        )
+
+
+def separation(
+    mechanism: Mechanism, plan: Plan, joint: str, noise: Noise | None = None
+) -> Separation:
+    """Computes what a plan shows of one of its joints.
+
+    Args:
+        mechanism: the simulation as it stands.
+        plan: the plan.
+        joint: a joint that it moves.
+        noise: of the log that will be written.
+    """
+    noise, drive = noise or Noise(), mechanism.drives[joint]
+    bench = _bench(mechanism, plan, joint)
+    kinds = _kinds(drive)
+    rest, sizes = _base(drive, kinds), _sizes(drive, kinds, bench)
+    bends = _bends(drive, rest)
+    candidates = [rest, *bends, *sizes.values()]
+    stacked = _stacked(candidates)
+    records = _simulate(tuple(kinds), stacked, bench)
+    scale = np.array([noise.angle_rad, noise.torque_nm])
+    flat = (np.asarray(records, dtype=float) / scale).reshape(len(candidates), -1)
+    changes = np.nan_to_num(flat - flat[0], posinf=0.0, neginf=0.0)
+    return _compared(joint, changes[1 : 1 + len(bends)], changes, sizes, rest)
+
+
+def _compared(joint, bends, changes, sizes, rest) -> Separation:
+    """Projects the known figures out and compares what is left."""
+    names = tuple(sizes)
+    signs = changes[1 + len(bends) :]
+    gram = np.linalg.inv(bends @ bends.T + np.eye(len(bends)))
+
+    def inner(a, b):
+        """Inner product after the known figures did what they can."""
+        return a @ b.T - (a @ bends.T) @ gram @ (bends @ b.T)
+
+    products = inner(signs, signs)
+    own = np.maximum(np.diag(products), 0.0)
+    across = products**2 / np.maximum(own[None, :], 1e-12)
+    apart = 0.5 * np.maximum(own[:, None] - across, 0.0)
+    tried = {
+        name: {
+            key: (float(rest[name][key]), float(value))
+            for key, value in candidate[name].items()
+            if value != rest[name][key]
+        }
+        for name, candidate in sizes.items()
+    }
+    apart *= np.minimum(1.0, CLEAR_NAT / np.maximum(0.5 * own, 1e-12))[:, None]
+    return Separation(joint, names, tried, 0.5 * own, apart)
+
+
+@dataclass(frozen=True, eq=False)
+class _Bench:
+    """One joint on the way that the plan takes it.
+
+    Attributes:
+        targets: at every row [rad].
+        stiffness: change of gravity's torque with the angle [N·m/rad].
+        around: gravity and the neighbour at every row.
+        inertia: of the joint [kg·m²].
+        kp, kd: gains.
+        repeat: substeps of a row.
+    """
+
+    targets: Float[np.ndarray, " n"]
+    stiffness: Float[np.ndarray, " n"]
+    around: Surroundings
+    inertia: float
+    kp: float
+    kd: float
+    repeat: int
+
+
+def _bench(mechanism: Mechanism, plan: Plan, joint: str) -> _Bench:
+    """Freezes the rigid bodies along the first repeat of the joint's waves."""
+    j = plan.joints.index(joint)
+    rows = np.zeros(len(plan.targets), dtype=bool)
+    for segment in plan.segments:
+        if joint in segment.joints and not segment.repeat:
+            start, stop = segment.start_s * plan.rate_hz, segment.stop_s * plan.rate_hz
+            rows[round(start) : round(stop)] = True
+    targets, drive = plan.targets[rows], mechanism.drives[joint]
+    around, stiffness, inertia = _rigid(mechanism, targets, j)
+    return _Bench(
+        targets=targets[:, j],
+        stiffness=stiffness,
+        around=around,
+        inertia=inertia,
+        kp=drive.kp.value,
+        kd=drive.kd.value,
+        repeat=max(round(1.0 / plan.rate_hz / STEP_S), 1),
+    )
+
+
+_EVERY = 4
+"""Rows between two postures that are evaluated; joints move little in between."""
+
+
+def _rigid(mechanism: Mechanism, targets: np.ndarray, j: int):
+    """Returns what surrounds a joint along targets, gravity's stiffness, inertia."""
+    model, data = mechanism.model, mujoco.MjData(mechanism.model)
+    qpos, dofs = joint_address(mechanism)
+    found: list[tuple[np.ndarray, ...]] = []
+    inertia, unit, moved = [], np.eye(model.nv)[dofs[j]], np.zeros(model.nv)
+    slopes = []
+    for posture in targets[::_EVERY]:
+        data.qpos[qpos] = posture
+        data.qpos[qpos[j]] += 1e-3
+        mujoco.mj_forward(model, data)
+        ahead = _moments(model, data, int(dofs[j]))[0]
+        data.qpos[qpos[j]] -= 1e-3
+        mujoco.mj_forward(model, data)
+        found.append(_moments(model, data, int(dofs[j])))
+        slopes.append((ahead - found[-1][0]) @ model.opt.gravity / 1e-3)
+        mujoco.mj_mulM(model, data, moved, unit)
+        inertia.append(moved[dofs[j]])
+    moment, payload, shift = (
+        np.repeat(np.array(x), _EVERY, 0)[: len(targets)]
+        for x in zip(*found, strict=True)
+    )
+    payload_kg = model.body_mass[_carrier(model, int(dofs[j]))]
+    other = j + 1 if j + 1 < targets.shape[1] else j - 1
+    rows = len(targets)
+    gravity = Gravity(
+        gravity=jnp.tile(jnp.asarray(model.opt.gravity), (rows, 1)),
+        moment=jnp.asarray(moment),
+        payload_kg=jnp.full(rows, payload_kg),
+        payload_moment=jnp.asarray(payload),
+        payload_shift=jnp.asarray(shift),
+        payload_inertia=jnp.sum(jnp.asarray(payload) ** 2, -1),
+    )
+    around = Surroundings(
+        others_nm=None,
+        other_q=jnp.asarray(targets[:, other] if other >= 0 else np.zeros(rows)),
+        other_nm=jnp.zeros(rows),
+        gravity=gravity,
+    )
+    stiffness = np.repeat(slopes, _EVERY)[:rows]
+    return around, stiffness, float(np.mean(inertia))
+
+
+def _carrier(model: mujoco.MjModel, dof: int) -> int:
+    """Returns the last body of a joint's chain, which would carry a payload."""
+    body = int(model.dof_bodyid[dof])
+    for child in range(body + 1, model.nbody):
+        if model.body_parentid[child] == body:
+            body = child
+    return body
+
+
+def _moments(model: mujoco.MjModel, data: mujoco.MjData, dof: int):
+    """Returns moments a × r of what a joint carries and of its payload.
+
+    That is: of all masses [kg·m], of a payload of 1 kg [m], and the change of the
+    latter by a shift along the axes of its body.
+    """
+    jacobian, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+    body, carrier = int(model.dof_bodyid[dof]), _carrier(model, dof)
+    mujoco.mj_jacSubtreeCom(model, data, jacobian, body)
+    moment = model.body_subtreemass[body] * jacobian[:, dof]
+    mujoco.mj_jacBodyCom(model, data, jacobian, turns, carrier)
+    axis, frame = turns[:, dof], data.xmat[carrier].reshape(3, 3)
+    return moment, jacobian[:, dof].copy(), np.cross(axis, frame.T)
+
+
+def _kinds(drive: JointDrive) -> dict[str, EffectKind]:
+    """Effects that a single joint shows; those of the drive come along."""
+    names = [name for name, kind in CATALOGUE.items() if _local(kind)]
+    return {name: CATALOGUE[name] for name in (*names, *drive.effects)}
+
+
+def _local(kind: EffectKind) -> bool:
+    """Whether one joint shows it; that a whole finger is weak, it cannot know."""
+    return bool(kind.acts) and kind.name != "finger_weakness"
+
+
+def _loads(bench: _Bench) -> Float[np.ndarray, " n"]:
+    """Torque of gravity along the targets [N·m]."""
+    world = bench.around.gravity
+    assert world is not None
+    return np.sum(np.asarray(world.moment) * np.asarray(world.gravity), -1)
+
+
+def _base(drive: JointDrive, kinds) -> dict[str, dict[str, float]]:
+    """Parameters of all effects in the simulation as it stands."""
+    base = {name: kind.identity() for name, kind in kinds.items()}
+    for name, values in drive.effects.items():
+        base[name] |= {key: figure.value for key, figure in values.items()}
+    for values in base.values():
+        values |= {k: NO_LIMIT for k, v in values.items() if np.isinf(v)}
+    return base
+
+
+def _sizes(drive: JointDrive, kinds, bench: _Bench) -> dict[str, dict]:
+    """All effects one by one, each at a size that such a joint may have."""
+    rest = _base(drive, kinds)
+    speed = np.max(np.abs(np.diff(bench.targets))) / bench.repeat / STEP_S
+    torque = max(np.max(np.abs(_loads(bench))), 0.01 * bench.kp)
+    sizes = {}
+    for name, kind in kinds.items():
+        values = dict(rest[name])
+        for key, parameter in kind.parameters.items():
+            center, spread = parameter.prior.center, parameter.prior.spread
+            if parameter.identity is None:
+                values[key] = center
+            elif np.isinf(parameter.identity):
+                top = {"rad/s": speed, "N·m": 5.0 * torque}.get(parameter.unit, center)
+                values[key] = 0.8 * min(rest[name][key], top)
+            elif parameter.unit == "N·m":
+                values[key] = 0.1 * torque
+            elif parameter.prior.kind == "lognormal" and parameter.identity == 0.0:
+                values[key] = rest[name][key] + center
+            elif parameter.prior.kind == "lognormal":
+                values[key] = rest[name][key] * min(spread, 1.2)
+            else:
+                values[key] = rest[name][key] + spread
+        sizes[name] = {**rest, name: values}
+    return sizes
+
+
+def _bends(drive: JointDrive, rest) -> list[dict]:
+    """The simulation with one known figure off by its tolerance."""
+    bends = []
+    gains = {"stiffness": drive.kp, "damping": drive.kd}
+    for name, figure in gains.items():
+        if name in rest:
+            scale = {"scale": rest[name]["scale"] * (1.0 + figure.tolerance)}
+            bends.append({**rest, name: scale})
+    for name, values in drive.effects.items():
+        for key, figure in values.items():
+            off = {**rest[name], key: figure.value * (1.0 + figure.tolerance)}
+            bends.append({**rest, name: off})
+    return bends
+
+
+def _stacked(candidates: list[dict]):
+    """Turns a list of parameter sets into one with arrays."""
+    return jax.tree.map(lambda *x: jnp.asarray(x, jnp.float32), *candidates)
+
+
+def _simulate(names: tuple[str, ...], stacked, bench: _Bench):
+    """Returns readings and efforts of all candidates (candidates, rows, 2)."""
+    rows = (bench.targets, _loads(bench), bench.stiffness, bench.around)
+    rows = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), rows)
+    figures = (bench.inertia, bench.kp, bench.kd)
+    return _run(names, bench.repeat, stacked, rows, figures)
+
+
+@partial(jax.jit, static_argnames=("names", "repeat"))
+def _run(names, repeat, stacked, rows, figures):
+    """Simulates candidates; targets and surroundings are held over the substeps."""
+    inertia, kp, kd = figures
+
+    def single(parameters):
+        model = [(CATALOGUE[name], parameters[name]) for name in names]
+
+        def substep(carry, now):
+            states, q, v, _ = carry
+            target, load, stiffness, around = now
+            load = load + stiffness * (q - target)
+            args = (target, q, v, load, kp, kd, STEP_S, around)
+            states, x = chain_step(model, states, *args)
+            q, v = joint_step(x, inertia, STEP_S)
+            return states, q, v, jnp.stack([x.reading, x.effort])
+
+        def row(carry, now):
+            carry = jax.lax.fori_loop(0, repeat, lambda _, c: substep(c, now), carry)
+            return carry, carry[-1]
+
+        start = rows[0][0]
+        states = init_states(model, start, start, STEP_S)
+        carry = (states, start, jnp.zeros(()), jnp.zeros(2))
+        first = jax.tree.map(lambda x: x[0], rows)
+        carry = jax.lax.fori_loop(0, SETTLE_ROWS, lambda _, c: row(c, first)[0], carry)
+        return jax.lax.scan(row, carry, rows)[1]
+
+    return jax.lax.map(single, stacked, batch_size=8)
