@@ -40,42 +40,41 @@ def true_parameters(case: Case, effect: str) -> dict[str, float]:
     """Returns what a perfect diagnosis would report, as far as it has one name.
 
     Where the effect is another value of a believed figure, the figure's own error
-    belongs to it.
+    belongs to it. Of a tilt, one joint shows one axis: only the pendulum's is known.
     """
     index = case.stand.names.index(case.joint)
     true, believed_ = case.truth.joints[index], case.stand.mechanism.joints[index]
     values = true.effects[effect]
-    match effect:
-        case "transport_delay":
-            return {"delay_s": true.delay_s + values["delay_s"]}
-        case "stiffness":
-            return {"scale": true.kp * values["scale"] / believed_.kp}
-        case "damping":
-            return {"scale": true.kd * values["scale"] / believed_.kd}
-        case "encoder_offset":
-            return {"offset_rad": true.offset_rad + values["offset_rad"]}
-        case "armature":
-            extra = true.armature - believed_.armature
-            return {"inertia_kgm2": values["inertia_kgm2"] + extra}
-        case "thermal_derating":
-            cool = values["cooling_per_s"]
-            loss = values["fall_per_nm2s"] / cool
-            return {"loss_per_nm2": loss, "time_constant_s": 1.0 / cool}
-        case "supply_sag":
-            return {"sag_per_nm": values["per_nm"]}
-        case "compliance":
-            return {
-                "compliance_rad_nm": 1.0 / values["stiffness_nm_rad"],
-                "motor_inertia_kgm2": ROTOR_SHARE * true.armature,
-            }
-        case "joint_coupling":
-            return {"stiffness_nm_rad": -values["stiffness_nm_rad"]}
-        case "clock_drift":
-            return {"drift_ppm": -1e6 * values["drift"]}
-        case "payload_mass":
-            return {"mass_kg": case.truth.payload_kg[index]}
-        case "mount_tilt" if case.stand.kind == "pendulum":
-            return {"pitch_rad": -values["angle_rad"]}
-        case "mount_tilt":
-            return {}
+    if effect == "mount_tilt":
+        upright = case.stand.kind == "pendulum"
+        return {"pitch_rad": -values["angle_rad"]} if upright else {}
+    if effect == "payload_mass":
+        return {"mass_kg": case.truth.payload_kg[index]}
+    if effect in _TRANSLATED:
+        return _TRANSLATED[effect](values, true, believed_)
     return dict(values)
+
+
+_TRANSLATED = {
+    "transport_delay": lambda v, true, was: {"delay_s": true.delay_s + v["delay_s"]},
+    "stiffness": lambda v, true, was: {"scale": true.kp * v["scale"] / was.kp},
+    "damping": lambda v, true, was: {"scale": true.kd * v["scale"] / was.kd},
+    "encoder_offset": lambda v, true, was: {
+        "offset_rad": true.offset_rad + v["offset_rad"]
+    },
+    "armature": lambda v, true, was: {
+        "inertia_kgm2": v["inertia_kgm2"] + true.armature - was.armature
+    },
+    "thermal_derating": lambda v, true, was: {
+        "loss_per_nm2": v["fall_per_nm2s"] / v["cooling_per_s"],
+        "time_constant_s": 1.0 / v["cooling_per_s"],
+    },
+    "supply_sag": lambda v, true, was: {"sag_per_nm": v["per_nm"]},
+    "compliance": lambda v, true, was: {
+        "compliance_rad_nm": 1.0 / v["stiffness_nm_rad"],
+        "motor_inertia_kgm2": ROTOR_SHARE * true.armature,
+    },
+    "joint_coupling": lambda v, true, was: {"stiffness_nm_rad": -v["stiffness_nm_rad"]},
+    "clock_drift": lambda v, true, was: {"drift_ppm": -1e6 * v["drift"]},
+}
+"""Hidden parameters in the product's units: (values, true joint, believed joint)."""
