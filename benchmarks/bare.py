@@ -32,7 +32,7 @@ def bare_cpu(env: HandEnv, worlds: int) -> Layer:
     """C MuJoCo's own thread pool over all cores, `mujoco.batch.Batch`."""
     batch = mujoco.batch.Batch(env.mj_model, worlds)
     batch.qpos = env.stance.qpos
-    substeps, steps = env.physics.n_substeps, 20
+    substeps, steps = env.plant.n_substeps, 20
     held = (worlds, substeps, env.mj_model.nu)
     ctrl = np.broadcast_to(np.array(env.stance.target_rad), held).copy()
 
@@ -67,7 +67,7 @@ def bare_warp(env: HandEnv, worlds: int) -> Layer:
     repeat = 50
 
     def call() -> None:
-        for _ in range(repeat * env.physics.n_substeps):
+        for _ in range(repeat * env.plant.n_substeps):
             step()
         wp.synchronize()
 

@@ -24,7 +24,7 @@ def through_jax(batch: BatchEnv, repeat: int) -> Layer:
     """The physics backend as the environment calls it, with randomized models."""
     env: Any = batch.env
     worlds = jax.jit(batch.reset)(jax.random.key(0))
-    ctrl = jnp.tile(jnp.array(env.stance.target_rad), (env.physics.n_substeps, 1))
+    ctrl = jnp.tile(jnp.array(env.stance.target_rad), (env.plant.n_substeps, 1))
 
     def one(lasting: Any, data: Any) -> Any:
         return env.physics.step(env.fields(lasting), data, ctrl).state

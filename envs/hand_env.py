@@ -9,7 +9,7 @@ import mujoco
 from jaxtyping import Array, Bool, Float
 
 from envs.base import State
-from envs.hand.drive import init_drive_state
+from envs.hand.effect_scene import friction_rows
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec
@@ -28,7 +28,7 @@ from envs.plant import make_plant
 from envs.randomize import draw_variation, model_fields
 from envs.scene import build_scene
 from envs.scoring import scheduled_weights, score
-from envs.sensing import sense
+from envs.sensing import imu_of, sense
 from envs.signals import Command, Signals, extract_signals
 from envs.streams import stream
 from rewards import RewardTable
@@ -56,15 +56,21 @@ class HandEnv:
         self.task, self.config = task, task.config
         self.hand = hand or load_hand_file()
         self.stance = stance or stance_of(self.hand)
-        physics = make_physics(
-            backend,
-            self.build_scene().compile(),
-            round(self.dt / PHYSICS_DT_S),
-            num_worlds,
-            contacts_per_world=self.config.contacts_per_world,
-            constraints_per_world=self.config.constraints_per_world,
-        )
-        self.plant = make_plant(physics, self.hand, self.stance)
+        model = self.build_scene().compile()
+
+        def make(substeps: int) -> Physics:
+            return make_physics(
+                backend,
+                model,
+                substeps,
+                num_worlds,
+                contacts_per_world=self.config.contacts_per_world,
+                constraints_per_world=self.config.constraints_per_world
+                + friction_rows(model),
+            )
+
+        substeps = round(self.dt / PHYSICS_DT_S)
+        self.plant = make_plant(make, self.hand, self.stance, substeps)
         first = jax.eval_shape(self.reset, jax.random.key(0))
         self._observation_size = {k: x.shape[-1] for k, x in first.obs.items()}
 
@@ -120,6 +126,7 @@ class HandEnv:
     def fields(self, lasting: Lasting) -> ModelFields:
         """All model fields in which a world differs from `mj_model`."""
         fields = model_fields(self.mj_model, self.spec, lasting.variation)
+        fields = self.plant.effects.change(fields)
         return self.task.vary_scene(self.plant, fields, lasting)
 
     def reset(self, key: Array) -> State:
@@ -207,7 +214,7 @@ class HandEnv:
         carried = self.task.begin_episode(key, lasting, data) | {
             "lasting": lasting,
             "steps": jnp.zeros((), jnp.int32),
-            "drive": init_drive_state(target, self.plant.drive, PHYSICS_DT_S),
+            "drive": self.plant.begin_drive(target, data),
             "target": target,
             "action": action,
         }
@@ -257,7 +264,10 @@ class HandEnv:
             carried: fields of the `Memory` after the step.
         """
         reference, noise = jnp.array(self.stance.joint_pos_rad), self.config.randomize
-        told = sense(noise, carried["lasting"], reference, data, carried["action"])
+        effects = self.plant.effects
+        joints = self.plant.joint_reading(carried["drive"], data) - reference
+        imu = effects.sense(imu_of(data, effects.down_w))
+        told = sense(noise, carried["lasting"], joints, imu, carried["action"])
         return told.replace(inputs=self.task.inputs(carried, told))
 
     def _observations(

@@ -5,6 +5,7 @@ from typing import Any
 import flax.struct
 from jaxtyping import Array, Float, Int
 
+from envs.hand.chained_drive import ChainState
 from envs.hand.drive import DriveState
 from envs.observations import Sample
 from envs.randomize import Variation
@@ -41,7 +42,7 @@ class Memory:
     Attributes:
         lasting: what survives a reset.
         steps: control steps of this episode.
-        drive: delay line and filters of the actuator chain.
+        drive: delay line and filters of the actuator chain; with effects, all of it.
         target: joint targets [rad] after the last action.
         action: last clipped policy output.
         history: the last eight samples of the observation.
@@ -52,7 +53,7 @@ class Memory:
 
     lasting: Lasting
     steps: Int[Array, "*b"]
-    drive: DriveState
+    drive: DriveState | ChainState
     target: Float[Array, "*b 20"]
     action: Float[Array, "*b 20"]
     history: Sample

@@ -63,10 +63,12 @@ def load_falls() -> Falls:
 def falls_of(hand: HandFile, stance: Stance) -> Falls:
     """Fallen poses of a hand: the stored ones, settled anew for another hand.
 
+    Effects do not enter.
+
     Raises:
         InputError: the hand does not come to rest on one of its sides.
     """
-    stored = load_falls()
+    stored, hand = load_falls(), hand.without_effects
     return stored if hand.sha256 == stored.hand_sha256 else settle_falls(hand, stance)
 
 

@@ -3,22 +3,31 @@
 import jax
 from jaxtyping import Array, Float
 
-from envs.hand.spec import JOINT_QPOS
+from envs.hand.effects.surroundings import Imu
 from envs.memory import Lasting
 from envs.observations import Sample
 from envs.physics import PhysicsState
 from envs.randomize import RandomizeConfig
-from envs.rotations import from_vector, rotate
-from envs.signals import gravity
+from envs.rotations import from_vector, rotate, unrotate
 from envs.streams import stream
 from rewards import safe_norm
+
+
+def imu_of(data: PhysicsState, down_w: Float[Array, "3"]) -> Imu:
+    """What an IMU in the palm tells without error.
+
+    Args:
+        data: the state that is measured.
+        down_w: unit vector of gravity in the world.
+    """
+    return Imu(gravity=unrotate(data.qpos[3:7], down_w), angvel=data.qvel[3:6])
 
 
 def sense(
     config: RandomizeConfig,
     lasting: Lasting,
-    reference_rad: Float[Array, "20"],
-    data: PhysicsState,
+    joint_pos: Float[Array, "20"],
+    imu: Imu,
     action: Float[Array, "20"],
 ) -> Sample:
     """What the actor is told of one control step, but for the task's inputs.
@@ -26,8 +35,8 @@ def sense(
     Args:
         config: bounds of the noise.
         lasting: the world's biases, and what its fresh noise is drawn from.
-        reference_rad: joint angles that read as zero [rad].
-        data: the state that is measured.
+        joint_pos: joint angles less those that read as zero [rad].
+        imu: what a perfectly mounted IMU tells.
         action: last clipped policy output.
     """
     variation = lasting.variation
@@ -38,13 +47,12 @@ def sense(
         noise = jax.random.uniform(stream(key, name), value.shape, minval=-1.0)
         return value + bound * noise
 
-    imu = from_vector(variation.imu_rotation_rad)
-    joints = data.qpos[JOINT_QPOS] - reference_rad
-    down = noisy("gravity", gravity(data.qpos[3:7]), config.gravity_noise)
-    angvel = data.qvel[3:6] + variation.gyro_bias_rps
+    mounting = from_vector(variation.imu_rotation_rad)
+    down = noisy("gravity", imu.gravity, config.gravity_noise)
+    angvel = imu.angvel + variation.gyro_bias_rps
     return Sample(
-        joint_pos=noisy("joints", joints, config.joint_noise_rad),
-        gravity=rotate(imu, down / safe_norm(down)),
-        angvel=noisy("gyro", rotate(imu, angvel), config.gyro_noise_rps),
+        joint_pos=noisy("joints", joint_pos, config.joint_noise_rad),
+        gravity=rotate(mounting, down / safe_norm(down)),
+        angvel=noisy("gyro", rotate(mounting, angvel), config.gyro_noise_rps),
         action=action,
     )

@@ -20,12 +20,13 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.batch import BatchEnv
-from envs.hand.drive import DriveState, command_sequence
+from envs.hand.chained_drive import ChainState
+from envs.hand.drive import DriveState
 from envs.hand.figures import figures
-from envs.hand.model import PHYSICS_DT_S
 from envs.memory import Lasting, Memory
 from envs.observations import Sample
-from envs.physics import PhysicsOutput, PhysicsState
+from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+from envs.physics.base import nominal_field
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluate_record import Trace, record
@@ -66,7 +67,9 @@ class Player:
         self.controller.check_joint_order(figures().joint_names)
         self._reset = jax.jit(env.env.reset)
         self._read: Callable[..., Sample] = jax.jit(self._reading)
-        self._drive: Callable[..., Any] = jax.jit(self._commands)
+        self._drive: Callable[..., Any] = jax.jit(env.plant.commands)
+        self._begin: Callable[..., Any] = jax.jit(env.plant.begin_substep)
+        self._fields: Callable[..., Any] = jax.jit(env.fields)
         self._judge: Callable[..., Any] = jax.jit(self._judged)
 
     def play(self, key: Array, steps: int, schedule: Schedule | None = None) -> Played:
@@ -89,8 +92,7 @@ class Player:
                 memory = dataclasses.replace(memory, command=command)
             before = _state(data)
             target = self._target(memory, before)
-            drive, commands = self._drive(memory.drive, target)
-            _advance(model, data, np.asarray(commands, float))
+            drive = self._advance(model, data, memory, target)
             memory = dataclasses.replace(memory, drive=drive)
             memory, row = self._judge(memory, before, _output(data), self.action)
             rows.append(jax.device_get(row))
@@ -118,13 +120,28 @@ class Player:
     def _reading(self, memory: Memory, state: PhysicsState) -> Sample:
         return self.env.sample(state, vars(memory))
 
-    def _commands(
-        self, drive: DriveState, target: Float[Array, "20"]
-    ) -> tuple[DriveState, Float[Array, "n 20"]]:
-        substeps = self.env.physics.n_substeps
-        return command_sequence(
-            self.env.plant.drive, drive, target, PHYSICS_DT_S, substeps
-        )
+    def _advance(
+        self,
+        model: mujoco.MjModel,
+        data: mujoco.MjData,
+        memory: Memory,
+        target: Float[np.ndarray, "20"],
+    ) -> DriveState | ChainState:
+        """Advances C MuJoCo by a control step; returns the drive's new state."""
+        plant, drive = self.env.plant, memory.drive
+        if not isinstance(drive, ChainState):
+            drive, commands = self._drive(drive, target)
+            for command in np.asarray(commands, float):
+                data.ctrl[:] = command
+                mujoco.mj_step(model, data)
+            return drive
+        fields = self._fields(memory.lasting)
+        for _ in range(plant.n_substeps):
+            drive, applied = self._begin(fields, _state(data), drive, target)
+            _write(model, applied)
+            mujoco.mj_step(model, data)
+            drive = plant.end_substep(drive, _output(data))
+        return drive
 
     def _judged(
         self,
@@ -157,20 +174,16 @@ def varied_model(env: BatchEnv, lasting: Lasting) -> mujoco.MjModel:
         lasting: the world.
     """
     model = copy.copy(env.mj_model)
-    for name, value in env.fields(lasting).items():
-        getattr(model, name)[:] = np.asarray(value)
+    _write(model, env.fields(lasting))
     # The compiler notes where a body's inertial frame is the body's own; no more.
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET
     return model
 
 
-def _advance(
-    model: mujoco.MjModel, data: mujoco.MjData, commands: Float[np.ndarray, "n 20"]
-) -> None:
-    for command in commands:
-        data.ctrl[:] = command
-        mujoco.mj_step(model, data)
+def _write(model: mujoco.MjModel, fields: ModelFields) -> None:
+    for name, value in fields.items():
+        nominal_field(model, name)[:] = np.asarray(value)
 
 
 def _state(data: mujoco.MjData) -> PhysicsState:

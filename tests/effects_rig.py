@@ -20,6 +20,7 @@ AROUND = Surroundings(
     others_nm=0.5,
     other_q=0.2,
     other_nm=0.1,
+    inertia=INERTIA,
     gravity=Gravity(
         gravity=np.array([0.0, 0.0, -9.81]),
         moment=0.2 * np.cross(AXIS, ARM),

@@ -20,17 +20,18 @@ from jaxtyping import Float
 
 from envs.config import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError, one_of
+from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.figures import figures
+from envs.hand.places import fingers_at, joints_at
 
 SCHEMA = 1
 DEFAULT_HAND_FILE = Path(__file__).with_name("hand.yaml")
 SOURCES = r"paper|vendor|ours|user|identified from \S.*"
 
-# Optional effects of the drive: parameter name -> unit, by effect name. Delay, filter,
-# speed limit, gains and torque limit are fields of their own, so there is none yet.
-EFFECTS: dict[str, dict[str, str]] = {}
+EFFECTS: dict[str, dict[str, str]] = {n: k.units() for n, k in CATALOGUE.items()}
+"""Units of the parameters of all effects, by effect and parameter name."""
 
-_NO_NOTE = ("note", "")
+_NOT_GIVEN = (("note", ""), ("other", ""))
 
 
 @dataclass(frozen=True)
@@ -92,10 +93,21 @@ class JointQuantity:
 
 @dataclass(frozen=True)
 class Effect:
-    """An optional effect of the drive, by its catalogue name, with its parameters."""
+    """What this hand does beside the figures above.
+
+    Attributes:
+        name: of an effect in `envs.hand.effects.catalogue`.
+        parameters: all its parameters.
+        where: places that have it: `all`, `flexion`, `abduction`, `pip`, `dip`, fingers
+            or joints by name. Effects of fingertips take fingers, effects of the whole
+            hand `all`.
+        other: joint that a coupled joint follows; for `joint_coupling` only.
+    """
 
     name: str
     parameters: dict[str, Quantity] = field(default_factory=dict)
+    where: tuple[str, ...] = ("all",)
+    other: str = ""
 
 
 def _limits(unit: str, low: float, high: float) -> dict[str, Any]:
@@ -131,6 +143,12 @@ class HandFile:
                 _check_limits(item.name, getattr(self, item.name), item.metadata)
         for index, effect in enumerate(self.effects):
             _check_effect(f"effects.{index}", effect)
+        _check_places(self.effects)
+
+    @property
+    def without_effects(self) -> "HandFile":
+        """The hand of the figures alone, which stance and starts are made for."""
+        return dataclasses.replace(self, effects=())
 
     @property
     def sha256(self) -> str:
@@ -170,9 +188,10 @@ def save_hand_file(hand: HandFile, path: str | Path) -> None:
 
 
 def _without_empty(data: Any) -> Any:
-    """Leaves out intervals and notes that are not given."""
+    """Leaves out intervals, notes and partners that are not given."""
     if isinstance(data, Mapping):
-        kept = {k: v for k, v in data.items() if v is not None and (k, v) != _NO_NOTE}
+        given = {k: v for k, v in data.items() if v is not None}
+        kept = {k: v for k, v in given.items() if (k, v) not in _NOT_GIVEN}
         return {key: _without_empty(value) for key, value in kept.items()}
     return [_without_empty(v) for v in data] if isinstance(data, list) else data
 
@@ -201,15 +220,54 @@ def _check_limits(name: str, quantity: Any, meta: Mapping[str, Any]) -> None:
 
 
 def _check_effect(name: str, effect: Effect) -> None:
-    """Refuses effects, parameters and units that the drive does not know."""
+    """Refuses effects, parameters, units and places that the catalogue has not."""
     if effect.name not in EFFECTS:
-        valid = one_of(EFFECTS, effect.name) if EFFECTS else "no effect: none is known"
+        valid = one_of(EFFECTS, effect.name)
         raise InputError("hand file", f"{name}.name", effect.name, valid)
     units = EFFECTS[effect.name]
     found = {key: quantity.unit for key, quantity in effect.parameters.items()}
     if found != units:
         valid = "these parameters with these units: " + json.dumps(units)
         raise InputError("hand file", f"{name}.parameters", found, valid)
+    for key, parameter in CATALOGUE[effect.name].parameters.items():
+        limits = _limits(parameter.unit, parameter.low, parameter.high)
+        _check_limits(f"{name}.parameters.{key}", effect.parameters[key], limits)
+    _check_where(name, effect)
+
+
+def _check_where(name: str, effect: Effect) -> None:
+    """Refuses places that the effect cannot have, and a wrong or missing partner."""
+    scope = CATALOGUE[effect.name].scope
+    if scope == "hand" and effect.where != ("all",):
+        valid = "[all], for an effect of the whole hand"
+        raise InputError("hand file", f"{name}.where", list(effect.where), valid)
+    at = fingers_at(effect.where) if scope == "finger" else joints_at(effect.where)
+    if not at:
+        raise InputError("hand file", f"{name}.where", "[]", "at least one place")
+    if effect.name == "joint_coupling":
+        if effect.other not in figures().joint_names:
+            valid = one_of(figures().joint_names, effect.other)
+            raise InputError("hand file", f"{name}.other", effect.other, valid)
+        if joints_at((effect.other,))[0] in at:
+            valid = "a joint that the effect does not act on"
+            raise InputError("hand file", f"{name}.other", effect.other, valid)
+    elif effect.other:
+        valid = "nothing: only joint_coupling has another joint"
+        raise InputError("hand file", f"{name}.other", effect.other, valid)
+
+
+def _check_places(effects: tuple[Effect, ...]) -> None:
+    """Refuses an effect that one place has twice."""
+    taken: set[tuple[str, int]] = set()
+    for index, effect in enumerate(effects):
+        fingers = CATALOGUE[effect.name].scope == "finger"
+        at = fingers_at(effect.where) if fingers else joints_at(effect.where)
+        new = {(effect.name, place) for place in at}
+        if taken & new:
+            valid = f"places that have no {effect.name} by an entry before"
+            found = list(effect.where)
+            raise InputError("hand file", f"effects.{index}.where", found, valid)
+        taken |= new
 
 
 def _numbers(quantity: Any, name: str) -> np.ndarray:

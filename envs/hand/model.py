@@ -10,6 +10,7 @@ the hand file.
 
 import numpy as np
 
+from envs.hand.effect_scene import add_effect_parts
 from envs.hand.figures import FINGERS, Link, figures
 from envs.hand.hand_file import HandFile
 from envs.quiet_mujoco import mujoco
@@ -54,6 +55,7 @@ def build_spec(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjSpec
         _add_drive(spec, link, index, hand)
     _exclude_neighbours(spec)
     _add_sensors(spec)
+    add_effect_parts(spec, hand, FLOOR)
     return spec
 
 

@@ -63,7 +63,8 @@ def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
     """The stance of a hand: the stored one, settled anew for another hand.
 
     The joint targets are the same; how deep a hand sinks under them depends on its
-    mass, stiffness and friction.
+    mass, stiffness and friction. Effects do not enter: they show as what differs from
+    the stance.
 
     Args:
         hand: the hand file.
@@ -72,7 +73,7 @@ def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
     Raises:
         InputError: the hand does not stand under these targets.
     """
-    stored = stored or load_stance()
+    stored, hand = stored or load_stance(), hand.without_effects
     if hand.sha256 == stored.hand_sha256:
         return stored
     return settle(hand, stored.qpos, np.array(stored.target_rad))

@@ -1,17 +1,26 @@
 """What a physics backend is: state in, state and sensors out, for one world."""
 
+import functools
 from typing import Protocol
 
 import flax.struct
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from envs.errors import InputError
 
 ModelFields = dict[str, Array]
-"""`MjModel` field name -> this world's value in the field's full shape."""
+"""`MjModel` field name -> this world's value in the field's full shape.
+
+Fields of `MjOption` are named `opt.<name>`, e.g. `opt.gravity`."""
+
+
+def nominal_field(mj_model: mujoco.MjModel, name: str) -> np.ndarray:
+    """The nominal value of a model field, also of one of its options."""
+    return functools.reduce(getattr, name.split("."), mj_model)
 
 
 @flax.struct.dataclass

@@ -19,6 +19,7 @@ from envs.physics.base import (
     PhysicsState,
     check_model,
     nan_if_diverged,
+    nominal_field,
 )
 from envs.quiet_mujoco import mujoco
 
@@ -85,7 +86,7 @@ class CpuPhysics:
         self, fields: dict[str, np.ndarray], state: Any, ctrl: np.ndarray
     ) -> list[np.ndarray]:
         """Steps all worlds; leading axes of the arguments broadcast to the worlds."""
-        ranks = {name: getattr(self.mj_model, name).ndim for name in fields}
+        ranks = {name: nominal_field(self.mj_model, name).ndim for name in fields}
         parts = [(fields[name], rank) for name, rank in ranks.items()]
         parts += [(state.qpos, 1), (state.qvel, 1), (state.qacc_warmstart, 1)]
         parts += [(ctrl, 2)]

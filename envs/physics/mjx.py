@@ -81,7 +81,7 @@ class MjxPhysics:
         """
         if self.impl == "warp":
             _check_batchable(fields)
-        blind, model = self._blind.replace(**fields), self._model.replace(**fields)
+        blind, model = _with(self._blind, fields), _with(self._model, fields)
 
         # Warp replays a recorded CUDA graph when it finds its buffers at the addresses
         # it recorded. A scan keeps all substeps in the same buffers; unrolled, each
@@ -113,6 +113,13 @@ class MjxPhysics:
         overflow = _overflow_type()
         solver = int(overflow.ITERATIONS | overflow.LS_ITERATIONS)
         return data._impl.overflow & ~solver
+
+
+def _with(model: Any, fields: ModelFields) -> Any:
+    """Returns the model with these fields; `opt.gravity` is one of its options."""
+    plain = {name: value for name, value in fields.items() if "." not in name}
+    options = {name: value for name, value in fields.items() if "." in name}
+    return model.replace(**plain).tree_replace(options)
 
 
 def _mj_step(model: Any, data: Any) -> Any:
@@ -186,7 +193,7 @@ def _check_batchable(fields: ModelFields) -> None:
 
     batchable = types._BATCH_DIM["Model"]
     for name in fields:
-        if not batchable.get(name, False):
+        if not batchable.get(name.replace(".", "__"), False):
             valid = "fields that MuJoCo Warp keeps per world, such as body_mass"
             raise InputError("physics fields", name, "a value per world", valid)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from envs.randomize import RandomizeConfig, no_randomization
-from envs.sensing import sense
+from envs.sensing import imu_of, sense
 
 NONE = no_randomization(0.88)
 
@@ -26,7 +26,8 @@ def read(world):
 
     def take(config, data=data, **changes):
         own = lasting.replace(**changes)
-        return sense(config, own, reference, data, jnp.full(20, 0.25))
+        imu = imu_of(data, jnp.array([0.0, 0.0, -1.0]))
+        return sense(config, own, data.qpos[7:] - reference, imu, jnp.full(20, 0.25))
 
     return take
 

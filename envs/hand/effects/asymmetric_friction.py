@@ -30,4 +30,5 @@ EFFECT = EffectKind(
     },
     source="A. Janot et al., Data Set and Reference Models of EMPS, Workshop on "
     "Nonlinear System Identification Benchmarks, 2019",
+    uses_load=True,
 )

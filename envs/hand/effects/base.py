@@ -9,7 +9,7 @@ whole hand change the physics model or what the IMU tells instead.
 import enum
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import flax.struct
 import jax.numpy as jnp
@@ -162,7 +162,9 @@ class EffectKind:
             tells them apart.
         source: literature.
         init: state at rest, from (parameters, target [rad], angle [rad], substep [s]).
+        scope: what one value of its parameters holds for.
         needs: fields of `Surroundings` without which `acts` cannot be computed.
+        uses_load: whether `acts` reads the load on the joint.
         changes_model: (parameters, scene, model fields) -> changed model fields, for
             effects that the physics model of the whole hand can have; there they act
             by it alone. Parameters are per finger or for the hand.
@@ -176,7 +178,9 @@ class EffectKind:
     confusable_with: Mapping[str, str]
     source: str
     init: Callable[[Params, Any, Any, float], Any] = field(default=_stateless)
+    scope: Literal["joint", "finger", "hand"] = "joint"
     needs: tuple[str, ...] = ()
+    uses_load: bool = False
     changes_model: ChangeModel | None = None
     senses: Callable[[Params, Imu], Imu] | None = None
 

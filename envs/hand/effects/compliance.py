@@ -42,6 +42,8 @@ def _transmission(params: Params, spring: Spring, x, dt):
     Of the motor's inertia the joint keeps what the spring is stiff enough to pass on.
     """
     lag, inertia = params["compliance_rad_nm"], params["motor_inertia_kgm2"]
+    if x.around.inertia is not None:
+        inertia = jnp.minimum(inertia, x.around.inertia)
     heavy = inertia / dt + x.damping
     soft = lag * (heavy / dt + x.follows * x.kp)
     motor_speed = x.encoder_speed

@@ -27,4 +27,5 @@ EFFECT = EffectKind(
     },
     source="ours, gravity in a turned frame",
     changes_model=_change,
+    scope="hand",
 )

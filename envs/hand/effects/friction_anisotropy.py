@@ -37,4 +37,5 @@ EFFECT = EffectKind(
     source="S. Walker, R. Leine, Set-Valued Anisotropic Dry Friction Laws, Nonlinear "
     "Dynamics 96, 2019 (friction that depends on the direction of sliding)",
     changes_model=_change,
+    scope="hand",
 )

@@ -23,4 +23,5 @@ EFFECT = EffectKind(
     source="O. Woodman, An Introduction to Inertial Navigation, University of "
     "Cambridge, UCAM-CL-TR-696, 2007",
     senses=_sense,
+    scope="hand",
 )

@@ -27,4 +27,5 @@ EFFECT = EffectKind(
     source="O. Woodman, An Introduction to Inertial Navigation, University of "
     "Cambridge, UCAM-CL-TR-696, 2007 (calibration errors)",
     senses=_sense,
+    scope="hand",
 )

@@ -24,4 +24,5 @@ EFFECT = EffectKind(
     },
     source="G. Duclusaud et al., Extended Friction Models for the Physics Simulation "
     "of Servo Actuators, arXiv 2410.08650 (models M3 and M5)",
+    uses_load=True,
 )

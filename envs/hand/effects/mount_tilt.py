@@ -45,4 +45,5 @@ EFFECT = EffectKind(
     },
     source="ours, gravity in a turned frame",
     needs=("gravity",),
+    scope="hand",
 )

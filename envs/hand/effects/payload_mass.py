@@ -48,4 +48,5 @@ EFFECT = EffectKind(
     "2nd ed., ch. 6 (load estimation)",
     needs=("gravity",),
     changes_model=_change,
+    scope="hand",
 )

@@ -42,12 +42,14 @@ class Surroundings:
         other_q: angle of the joint that is coupled to this one [rad].
         other_nm: effort of that joint [N·m].
         gravity: gravity's torques.
+        inertia: what of the joint's inertia may turn with the motor [kg·m²].
     """
 
     others_nm: Float[Array, "*j"] | float | None = None
     other_q: Float[Array, "*j"] | None = None
     other_nm: Float[Array, "*j"] | None = None
     gravity: Gravity | None = None
+    inertia: Float[Array, "*j"] | float | None = None
 
 
 ALONE = Surroundings()

@@ -24,4 +24,5 @@ EFFECT = EffectKind(
     },
     source="Paper, Table I (kinetic friction 0.80 to 0.97 over three loaded pulls)",
     changes_model=_change,
+    scope="finger",
 )

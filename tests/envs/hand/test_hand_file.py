@@ -8,6 +8,7 @@ import pytest
 from envs.config import dump_yaml, from_dict, override, to_dict
 from envs.errors import InputError
 from envs.hand import hand_file
+from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.figures import figures
 from envs.hand.hand_file import (
     DEFAULT_HAND_FILE,
@@ -128,7 +129,8 @@ def test_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
         ("speed_limit.value.3=1000", "speed_limit.value", "0.01 to 100 [rad/s]"),
         ("delay_s.value=0.5", "delay_s.value", "0 to 0.2 [s]"),
         ("payload_pos.value=[0, 0]", "payload_pos.value", "a list of 3"),
-        ("effects=[{name: backlash}]", "effects.0.name", "no effect"),
+        ("effects=[{name: backlsh}]", "effects.0.name", "did you mean backlash"),
+        ("effects=[{name: backlash}]", "effects.0.parameters", "gap_rad"),
         ("effects=[backlash]", "effects.0", "a mapping of name, parameters"),
     ],
 )
@@ -156,20 +158,69 @@ def test_missing_field_and_malformed_file(tmp_path):
         load_hand_file(path)
 
 
-def test_effects_are_checked_against_the_catalogue(monkeypatch):
-    monkeypatch.setitem(hand_file.EFFECTS, "backlash", {"width": "rad"})
-    width = {"value": 0.01, "unit": "rad", "source": "identified from 3f2a"}
-    data = to_dict(HAND)
-    data["effects"] = [{"name": "backlash", "parameters": {"width": width}}]
-    hand = from_dict(HandFile, data, "memory")
+def with_effects(*effects):
+    return from_dict(HandFile, to_dict(HAND) | {"effects": list(effects)}, "memory")
+
+
+def gap(**changes):
+    given = {"value": 0.01, "unit": "rad", "source": "identified from 3f2a"}
+    return {"name": "backlash", "parameters": {"gap_rad": given | changes}}
+
+
+def test_effects_are_checked_against_the_catalogue():
+    hand = with_effects(gap() | {"where": ["index", "finger1_joint3", "abduction"]})
     assert isinstance(hand.effects[0], Effect)
     assert from_dict(HandFile, to_dict(hand), "memory") == hand
-    for name, parameters in (
-        ("backlsh", {"width": width}),
-        ("backlash", {}),
-        ("backlash", {"width": width | {"unit": "deg"}}),
-        ("backlash", {"width": width, "more": width}),
+    assert set(hand_file.EFFECTS) == set(CATALOGUE)
+    bad = gap()
+    bad["parameters"] = bad["parameters"] | {"more": bad["parameters"]["gap_rad"]}
+    coupling = entry("joint_coupling")
+    for effect, field in (
+        (gap() | {"name": "backlsh"}, "name"),
+        (gap() | {"parameters": {}}, "parameters"),
+        (gap(unit="deg"), "parameters"),
+        (gap(value=0.31), "parameters.gap_rad.value"),
+        (bad, "parameters"),
+        (gap() | {"where": ["indx"]}, "where"),
+        (gap() | {"where": []}, "effects.0.where"),
+        (gap() | {"other": "finger1_joint1"}, "other"),
+        (entry("floor_tilt") | {"where": ["index"]}, "effects.0.where"),
+        (entry("tip_friction") | {"where": ["pip"]}, "where"),
+        (coupling, "effects.0.other"),
+        (coupling | {"other": "finger1_joint1"}, "effects.0.other"),
     ):
-        data["effects"] = [{"name": name, "parameters": parameters}]
-        with pytest.raises(InputError, match=r"effects\.0"):
-            from_dict(HandFile, data, "memory")
+        with pytest.raises(InputError) as caught:
+            with_effects(effect)
+        assert field in caught.value.field
+
+
+def entry(name):
+    """An effect at the centers of its priors."""
+    return {
+        "name": name,
+        "parameters": {
+            key: {"value": p.prior.center, "unit": p.unit, "source": "user"}
+            for key, p in CATALOGUE[name].parameters.items()
+        },
+    }
+
+
+def test_a_place_has_an_effect_once():
+    index, thumb = (gap() | {"where": [w]} for w in ("index", "thumb"))
+    assert len(with_effects(index, thumb, entry("deadband")).effects) == 3
+    with pytest.raises(InputError, match=r"effects\.2\.where"):
+        with_effects(index, thumb, gap() | {"where": ["finger2_joint3"]})
+    with pytest.raises(InputError, match=r"effects\.1\.where"):
+        with_effects(entry("floor_tilt"), entry("floor_tilt"))
+
+
+def test_a_hand_with_effects_is_written_and_read(tmp_path):
+    path = tmp_path / "hand.yaml"
+    coupling = entry("joint_coupling") | {
+        "where": ["finger2_joint4"],
+        "other": "finger2_joint3",
+    }
+    hand = with_effects(gap() | {"where": ["pip"]}, coupling)
+    save_hand_file(hand, path)
+    assert load_hand_file(path) == hand
+    assert hand.without_effects == HAND

@@ -1,0 +1,234 @@
+"""The drive of a hand with effects of joints: the whole chain outside of MuJoCo.
+
+Every substep the chain that identification fits computes each joint's torque, friction
+and damping from target, angle and speed; the actuators of the physics only apply them.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+import flax.struct
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.hand.effect_scene import load_sensor
+from envs.hand.effects.base import EffectKind, Params, Substep
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.hand.effects.surroundings import Surroundings
+from envs.hand.figures import figures
+from envs.hand.hand_file import HandFile
+from envs.hand.places import joints_at
+from envs.hand.spec import JOINT_QPOS, JOINT_QVEL, HandSpec
+from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+
+LIMIT = "torque_limit"
+_UNLIMITED_NM = 1e6
+
+
+@dataclass(frozen=True)
+class Chain:
+    """The drive of one hand as a tuple of effects.
+
+    Attributes:
+        kinds: the command path and the limit of every hand, and its own effects, in the
+            order of the catalogue.
+        params: their parameters per joint (20); where a hand does not have an effect,
+            those at which it vanishes. The limit takes its own from the model.
+        other: index of the joint that each joint is coupled to.
+        uses_load: whether the physics must tell the load on the joints.
+        dt: substep [s].
+    """
+
+    kinds: tuple[EffectKind, ...]
+    params: tuple[Params, ...]
+    other: tuple[int, ...]
+    uses_load: bool
+    dt: float
+
+
+@flax.struct.dataclass
+class ChainState:
+    """What the chain carries from substep to substep.
+
+    Attributes:
+        effects: states of the effects.
+        reading: joint angles as the host reads them [rad].
+        effort: torques of the motors in the last substep [N·m].
+        load: torques of the links on the joints in the last substep [N·m].
+    """
+
+    effects: tuple[Any, ...]
+    reading: Float[Array, "*b 20"]
+    effort: Float[Array, "*b 20"]
+    load: Float[Array, "*b 20"]
+
+
+def make_chain(hand: HandFile, dt: float) -> Chain | None:
+    """Makes the chain of a hand; none if MuJoCo's position servo is all of its drive.
+
+    Args:
+        hand: the hand file.
+        dt: substep of the physics [s].
+    """
+    own = {e.name for e in hand.effects if in_chain(CATALOGUE[e.name])}
+    if not own:
+        return None
+    base = {
+        "transport_delay": {"delay_s": np.full(20, hand.delay_s.value)},
+        "lowpass_cutoff": {"cutoff_hz": np.full(20, hand.lowpass_hz.value)},
+        "slew_limit": {"speed_rad_s": hand.speed_limit.per_joint()},
+        LIMIT: {"limit_nm": np.full(20, np.inf)},
+    }
+    links = []
+    for name, kind in CATALOGUE.items():
+        links += [(kind, base[name])] if name in base else []
+        links += [(kind, joint_params(hand, name))] if name in own else []
+    return Chain(
+        kinds=tuple(kind for kind, _ in links),
+        params=tuple(_float32(params) for _, params in links),
+        other=_others(hand),
+        uses_load=any(kind.uses_load for kind, _ in links),
+        dt=dt,
+    )
+
+
+def in_chain(kind: EffectKind) -> bool:
+    """Whether an effect acts in the chain of a hand, and not by the physics model."""
+    return bool(kind.acts) and kind.changes_model is None
+
+
+def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, "20"]]:
+    """Returns the parameters of an effect per joint; elsewhere it vanishes."""
+    found = {k: np.full(20, v) for k, v in CATALOGUE[name].identity().items()}
+    for effect in hand.effects:
+        if effect.name == name:
+            at = list(joints_at(effect.where))
+            for key, quantity in effect.parameters.items():
+                found[key][at] = quantity.value
+    return found
+
+
+def begin_chain(
+    chain: Chain, target: Float[Array, "20"], q: Float[Array, "20"]
+) -> ChainState:
+    """Returns the chain at rest.
+
+    Args:
+        chain: the drive.
+        target: joint targets that have been sent for long [rad].
+        q: joint angles [rad].
+    """
+    none = jnp.zeros(20)
+    links = _links(chain, jnp.inf * jnp.ones(20))
+    states = init_states(links, target, q, chain.dt)
+    rest = ChainState(effects=states, reading=q, effort=none, load=none)
+    around = _around(chain, rest, q)
+    x = chain_step(links, states, target, q, none, 0.0, 1.0, 0.0, chain.dt, around)[1]
+    return rest.replace(reading=x.reading)
+
+
+def chain_substep(
+    chain: Chain,
+    fields: ModelFields,
+    nominal: Any,
+    drive: ChainState,
+    state: PhysicsState,
+    target: Float[Array, "20"],
+) -> tuple[ChainState, ModelFields]:
+    """Runs the chain for one substep of the physics.
+
+    Args:
+        chain: the drive.
+        fields: model fields of this world; gains and limits of its drives among them.
+        nominal: `mujoco.MjModel` of the fields that are not given.
+        drive: state of the chain.
+        state: state of the physics before the substep.
+        target: joint targets [rad].
+
+    Returns:
+        The new state, and the fields under which the physics makes this substep.
+    """
+    q, qd = state.qpos[JOINT_QPOS], state.qvel[JOINT_QVEL]
+    gain, bias = (fields[f"actuator_{name}prm"] for name in ("gain", "bias"))
+    links = _links(chain, fields["actuator_forcerange"][:, 1])
+    rotor = jnp.asarray(nominal.dof_armature[JOINT_QVEL], jnp.float32)
+    around = _around(chain, drive, q).replace(inertia=rotor)
+    kp, kd = gain[:, 0], -bias[:, 2]
+    states, x = chain_step(
+        links, drive.effects, target, q, qd, drive.load, kp, kd, chain.dt, around
+    )
+    drive = drive.replace(effects=states, reading=x.reading, effort=x.effort)
+    return drive, fields | _applied(fields, nominal, x)
+
+
+def read_load(
+    chain: Chain, spec: HandSpec, drive: ChainState, output: PhysicsOutput
+) -> ChainState:
+    """Takes the load on the joints from the sensors of the last substep, if needed."""
+    if not chain.uses_load:
+        return drive
+    held = [
+        spec.read(output.sensordata, load_sensor(name))[1]
+        for name in figures().joint_names
+    ]
+    return drive.replace(load=-jnp.stack(held))
+
+
+def _applied(fields: ModelFields, nominal: Any, x: Substep) -> ModelFields:
+    """Model fields that make the physics apply the signals of a substep.
+
+    The actuator's force is τ − d (q̇' − q̇), with the damping d taken implicitly.
+    """
+
+    def given(name: str) -> Array:
+        return jnp.asarray(fields.get(name, getattr(nominal, name)), jnp.float32)
+
+    bias = jnp.zeros_like(given("actuator_biasprm"))
+    constant = x.torque + x.passive + x.damping * x.qd
+    armature = given("dof_armature")
+    changed = {
+        "actuator_gainprm": jnp.zeros_like(given("actuator_gainprm")),
+        "actuator_biasprm": bias.at[:, 0].set(constant).at[:, 2].set(-x.damping),
+        "actuator_forcerange": jnp.broadcast_to(
+            jnp.array([-_UNLIMITED_NM, _UNLIMITED_NM]), (20, 2)
+        ),
+        "dof_damping": given("dof_damping").at[JOINT_QVEL].add(x.viscous),
+        "dof_armature": jnp.maximum(armature.at[JOINT_QVEL].add(x.inertia), 0.0),
+    }
+    if np.any(nominal.dof_frictionloss[JOINT_QVEL] > 0.0):
+        friction = given("dof_frictionloss").at[JOINT_QVEL].add(x.friction)
+        changed["dof_frictionloss"] = friction
+    return changed
+
+
+def _links(chain: Chain, limit_nm: Array) -> tuple[tuple[EffectKind, Params], ...]:
+    """The effects with parameters; the first torque limit is that of the model."""
+    first = next(i for i, kind in enumerate(chain.kinds) if kind.name == LIMIT)
+    params = list(chain.params)
+    params[first] = {"limit_nm": limit_nm}
+    return tuple(zip(chain.kinds, params, strict=True))
+
+
+def _around(chain: Chain, drive: ChainState, q: Float[Array, "20"]) -> Surroundings:
+    """What the other joints did in the last substep."""
+    size = jnp.abs(drive.effort)
+    other = jnp.array(chain.other)
+    return Surroundings(
+        others_nm=jnp.sum(size) - size, other_q=q[other], other_nm=drive.effort[other]
+    )
+
+
+def _others(hand: HandFile) -> tuple[int, ...]:
+    """Partner of each joint; its own index where there is none."""
+    other = list(range(20))
+    for effect in hand.effects:
+        if effect.other:
+            for joint in joints_at(effect.where):
+                other[joint] = joints_at((effect.other,))[0]
+    return tuple(other)
+
+
+def _float32(params: dict[str, np.ndarray]) -> Params:
+    return {key: jnp.asarray(value, jnp.float32) for key, value in params.items()}
