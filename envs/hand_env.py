@@ -24,6 +24,7 @@ from envs.physics import (
     PhysicsState,
     make_physics,
 )
+from envs.physics.room import overflow_metrics
 from envs.plant import make_plant
 from envs.randomize import draw_variation, model_fields
 from envs.scene import build_scene
@@ -285,5 +286,5 @@ class HandEnv:
     ) -> dict[str, Array]:
         """Per-step scalars: reward terms, the task's measures, buffer overflow."""
         named = {f"reward/{name}": value for name, value in terms.items()}
-        overflow = (output.overflow != 0).astype(jnp.float32)
-        return named | self.task.measures(signals) | {"contact_overflow": overflow}
+        room = overflow_metrics(output.overflow)
+        return named | self.task.measures(signals) | room

@@ -20,18 +20,20 @@ class HandSettings:
         randomize: domain randomization.
         contacts_per_world, constraints_per_world: room for contacts and constraint
             rows on the warp backend, see `envs.physics.make_physics`; what does not fit
-            is dropped and shows in the metric `contact_overflow`.
+            is dropped, and told (`envs.physics.room`).
     """
 
-    episode_s: float = field(default=20.0, metadata={"unit": "s", "low": 0.1})
+    episode_s: float = field(
+        default=20.0, metadata={"unit": "s", "low": 0.1, "high": 1e6}
+    )
     control_dt_s: float = field(default=0.02, metadata={"unit": "s", "low": 0.005})
     action_scale_rad: float = field(default=0.060, metadata={"unit": "rad", "low": 0.0})
     action_clip: float = field(default=1.5, metadata={"unit": "1", "low": 0.1})
     curriculum_scale: float = field(default=1.0, metadata={"unit": "1", "low": 1e-3})
     weights: dict[str, float] = field(default_factory=dict)
     randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
-    contacts_per_world: int = field(default=48, metadata={"low": 1})
-    constraints_per_world: int = field(default=128, metadata={"low": 1})
+    contacts_per_world: int = field(default=48, metadata={"low": 1, "free": True})
+    constraints_per_world: int = field(default=128, metadata={"low": 1, "free": True})
 
     def __post_init__(self) -> None:
         check_interval(self.control_dt_s)

@@ -88,7 +88,7 @@ class KeyboardConfig(HandSettings):
     requests: RequestConfig = field(default_factory=RequestConfig)
     keyboard: KeyboardVariation = field(default_factory=KeyboardVariation)
     # Warp's pool also holds pairs of links and keys that are only near each other.
-    contacts_per_world: int = field(default=96, metadata={"low": 1})
+    contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
 
     def __post_init__(self) -> None:
         super().__post_init__()

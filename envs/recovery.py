@@ -58,7 +58,7 @@ class RecoveryConfig(HandSettings):
     settle: bool = False
     # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
     # 14 contacts under random actions, and Warp's pool also holds the near pairs.
-    contacts_per_world: int = field(default=96, metadata={"low": 1})
+    contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
 
     def __post_init__(self) -> None:
         super().__post_init__()

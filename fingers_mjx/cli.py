@@ -75,7 +75,8 @@ def _sentence(error: Exception) -> str:
         extra = _EXTRAS[str(error.name)]
         return f'{error.name} is not installed; pip install "fingers-mjx[{extra}]"'
     if isinstance(error, OSError) and error.filename:
-        return f"{error.filename}: {error.strerror}"
+        valid = "a path that can be read and written"
+        return f"{error.filename}: found {error.strerror}; valid: {valid}"
     return " ".join(str(error).split())
 
 

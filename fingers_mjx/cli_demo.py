@@ -4,6 +4,7 @@ import argparse
 import sys
 from functools import partial
 
+from fingers_mjx.cli_paths import check_directory
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.demo import POLICY_DIR, demo
 from fingers_mjx.demo_screen import Screen
@@ -12,6 +13,7 @@ from fingers_mjx.progress import reporter
 
 def run(args: argparse.Namespace) -> int:
     """Runs the demonstration; progress and the place of the report go to stdout."""
+    check_directory("--out", args.out)
     policy = args.policy or POLICY_DIR
     screen = Screen(
         say=partial(print, flush=True),

@@ -7,6 +7,7 @@ from typing import Any
 
 from envs.errors import InputError
 from envs.physics import default_backend
+from fingers_mjx.cli_paths import check_directory, check_file
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.cli_train import check_backend
@@ -30,6 +31,8 @@ def run(args: argparse.Namespace) -> int:
     if len(args.commands or ()) > 1:
         raise InputError("--command", "", f"{len(args.commands)} commands", "one")
     check_policy_settings(args.settings)
+    check_file("--json", args.json)
+    check_directory("--out", args.out)
     loaded = load_source(args.policy)
     source = dataclasses.replace(loaded, setup=_setup(args, loaded.setup))
     with counting(sys.stderr, "evaluating", "steps") as progress:

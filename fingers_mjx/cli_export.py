@@ -2,6 +2,7 @@
 
 import argparse
 
+from fingers_mjx.cli_paths import check_directory
 from fingers_mjx.export_run import export_run
 from fingers_mjx.policy_source import check_run
 
@@ -10,6 +11,7 @@ def run(args: argparse.Namespace) -> int:
     """Exports and says how far the runtimes are from JAX."""
     check_run(args.run_dir)
     out = args.out or args.run_dir
+    check_directory("--out", out)
     report = export_run(args.run_dir, out)
     print(
         f"wrote {out}: policy.onnx, manifest.json, config.yaml, hand.yaml\n"

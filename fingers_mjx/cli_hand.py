@@ -6,12 +6,15 @@ from pathlib import Path
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.stance import settle, stance_json, stance_of
 from envs.hand.stance_search import search_stance
+from fingers_mjx.cli_paths import check_directory, check_file
 from fingers_mjx.evaluate_files import write_atomic
 from fingers_mjx.hand_mjcf import standing_mjcf
 
 
 def run(args: argparse.Namespace) -> int:
     """Shows the hand, searches its stance or writes its model."""
+    check = check_directory if args.action == "show" else check_file
+    check("--out", args.out)
     hand = load_hand_file(args.hand or DEFAULT_HAND_FILE)
     if args.action == "show":
         return _show(hand, args.out)

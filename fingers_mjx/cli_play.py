@@ -6,6 +6,7 @@ import sys
 from typing import Any
 
 from envs.errors import InputError, one_of
+from fingers_mjx.cli_paths import check_file
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.evaluate_files import write_summary
@@ -22,6 +23,8 @@ def run(args: argparse.Namespace) -> int:
     if args.video and args.video.suffix not in VIDEO_SUFFIXES:
         valid = one_of(VIDEO_SUFFIXES)
         raise InputError("--video", "suffix", args.video.suffix, valid)
+    check_file("--json", args.json)
+    check_file("--video", args.video)
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
     player = Player(make_env(setup, 1, "cpu"), bundle, args.runtime)

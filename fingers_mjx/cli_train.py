@@ -9,7 +9,9 @@ from typing import Any
 
 from envs.errors import InputError, one_of
 from envs.physics import BACKENDS, default_backend
+from envs.physics.quiet_mjx import WARP_INSTALLED
 from envs.registry import get_task, task_names
+from fingers_mjx.cli_paths import check_directory
 from fingers_mjx.ppo_config import TrainConfig, preset
 from fingers_mjx.ppo_state import train_template
 from fingers_mjx.progress import reporter
@@ -29,6 +31,8 @@ _FOR_NEW_RUNS = ("hand", "out", "warm_start")
 
 def run(args: argparse.Namespace) -> int:
     """Trains, and reports on stdout."""
+    _check_words(args.settings)
+    check_directory("--out", args.out)
     resume = args.resume is not None
     setup = _resumed(args) if resume else _new(args)
     path = args.resume or args.out or _default_dir(setup.train)
@@ -69,6 +73,18 @@ def _new(args: argparse.Namespace) -> Setup:
     return overridden(new_setup(train_config, args.hand), args.settings)
 
 
+def _check_words(assignments: list[str]) -> None:
+    """Refuses to set what the command line has words of its own for.
+
+    Everything else follows from these two: the task's settings, the preset's values.
+    """
+    for text in assignments:
+        name, _, value = text.partition("=")
+        if name in ("task", "preset"):
+            valid = f"{value} as {'TASK' if name == 'task' else '--preset'}"
+            raise InputError("--set", name, value, f"without --set, {valid}")
+
+
 def _resumed(args: argparse.Namespace) -> Setup:
     """Returns the saved settings; what may be changed in them, `--set` changes."""
     for name in _FOR_NEW_RUNS:
@@ -87,10 +103,13 @@ def check_backend(name: str) -> str:
     """Returns `name`, the name of a physics backend.
 
     Raises:
-        InputError: there is no such backend.
+        InputError: there is no such backend, or it is not installed.
     """
     if name not in BACKENDS:
         raise InputError("--backend", "", name, one_of(BACKENDS, name))
+    if name == "warp" and not WARP_INSTALLED:
+        valid = 'what is installed; pip install "fingers-mjx[warp]" for warp'
+        raise InputError("--backend", "", name, valid)
     return name
 
 

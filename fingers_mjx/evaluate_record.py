@@ -5,6 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from envs.base import State
+from envs.physics.room import ROOM
 from fingers_mjx import measures
 
 MASS_KG = 0.818
@@ -31,7 +32,8 @@ class Trace:
         power_w: Σ |torque · joint speed| [W].
         done: the episode ended in this step.
         failed: it ended for another reason than the time limit.
-        overflow: the physics ran out of room for contacts and dropped some.
+        overflow: something was dropped for want of room, in the order of
+            `envs.physics.room.ROOM`: contacts, constraints.
         extra: the task's own signals by name.
     """
 
@@ -48,7 +50,7 @@ class Trace:
     power_w: Float[Array, "*t"]
     done: Bool[Array, "*t"]
     failed: Bool[Array, "*t"]
-    overflow: Bool[Array, "*t"]
+    overflow: Bool[Array, "*t 2"]
     extra: dict[str, Array] = flax.struct.field(default_factory=dict)
 
 
@@ -57,6 +59,7 @@ def record(state: State) -> Trace:
     signals, done = state.signals, state.done > 0
     links = signals.link_contact.any(axis=-1)
     power = jnp.abs(signals.torque_nm * signals.joint_vel).sum(axis=-1)
+    dropped = [state.metrics.get(name, jnp.zeros_like(power)) > 0 for name in ROOM]
     return Trace(
         command=signals.command,
         vel_v=signals.vel_v[..., :2],
@@ -71,7 +74,7 @@ def record(state: State) -> Trace:
         power_w=power,
         done=done,
         failed=done & (state.info["truncation"] == 0),
-        overflow=state.metrics.get("contact_overflow", jnp.zeros_like(power)) > 0,
+        overflow=jnp.stack(dropped, axis=-1),
         extra=signals.extra,
     )
 
@@ -137,5 +140,7 @@ def _motion_measures(
         ),
         "command_speed_mps": measures.masked_mean(planar, alive),
         "command_turn_rate_rad_s": measures.masked_mean(command[:, 2], alive),
-        "contact_overflow_rate": measures.masked_mean(trace.overflow * 1.0, alive),
+        "contact_overflow_rate": measures.masked_mean(
+            trace.overflow.any(axis=-1) * 1.0, alive
+        ),
     }

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
+from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
 from fingers_mjx import figures
 from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
@@ -91,7 +92,8 @@ def evaluate_source(
         progress: told (steps done, steps in all).
 
     Raises:
-        InputError: settings that do not fit.
+        InputError: settings that do not fit, or too little room for the contacts: what
+            is measured without some of them is no result.
     """
     setup = source.setup
     if steps is not None:
@@ -100,7 +102,7 @@ def evaluate_source(
         setup = dataclasses.replace(setup, env=env)
     # What a fallen hand does does not count, so there is no need to set it up again.
     batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
-    return evaluate(
+    table = evaluate(
         batch,
         lambda obs: act(source.network, obs["state"]),
         episodes,
@@ -110,6 +112,19 @@ def evaluate_source(
         progress,
         batch.task.episode_measures,
     )
+    _check_room(table, setup.env)
+    return table
+
+
+def _check_room(table: EpisodeTable, config: Any) -> None:
+    """Raises InputError if something was dropped in a step that counts."""
+    episodes = [table.episode(index) for index in range(table.traces.done.shape[1])]
+    hit = np.array([one.overflow.any(axis=0) for one in episodes])
+    for metric, count in zip(ROOM, hit.sum(axis=0), strict=True):
+        if count:
+            what = metric.removesuffix("_overflow")
+            source = f"evaluation: {what}s dropped in {count} of {len(hit)} episodes"
+            raise too_little_room(source, metric, config, " (with --set)")
 
 
 def hand_mass_kg(batch: BatchEnv) -> float:

@@ -9,6 +9,8 @@ from envs.errors import InputError, one_of
 
 POSITIVE = 1e-9
 """Lower bound of numbers that must be above zero."""
+MAX_WORLDS, MAX_ITERATIONS = 2**20, 10**7
+"""Bounds beyond any machine, within which no counter of 32 bits overflows."""
 SMALL_MEAN_SCALE = 0.01
 """`init_mean_scale` of policies that hardly act at the start (ours)."""
 
@@ -17,6 +19,11 @@ def _number(default: Any, low: Any, high: Any = None, **notes: Any) -> Any:
     """Returns a field with a range; `free=True` if a resumed run may change it."""
     limits = {"low": low} if high is None else {"low": low, "high": high}
     return dataclasses.field(default=default, metadata=limits | notes)
+
+
+def _free(default: Any) -> Any:
+    """Returns a field that a resumed run may change."""
+    return dataclasses.field(default=default, metadata={"free": True})
 
 
 @dataclass(frozen=True)
@@ -86,6 +93,8 @@ class TrainConfig:
         log_every: iterations between two rows of metrics.
         checkpoint_every: iterations between two checkpoints.
         keep_checkpoints: newest checkpoints kept on disk.
+        on_overflow: what to do when Warp had no room for all contacts and dropped some:
+            "stop" with what to set, or "warn" and go on; see `envs.physics.room`.
         hang_limit_s: shortest time without progress that counts as a hang [s].
         ppo: settings of the learner.
     """
@@ -94,12 +103,13 @@ class TrainConfig:
     preset: str = "paper"
     seed: int = _number(0, 0, 2**32 - 1)
     backend: str = "cpu"
-    num_envs: int = _number(4096, 1)
-    iterations: int = _number(8000, 1, free=True)
+    num_envs: int = _number(4096, 1, MAX_WORLDS)
+    iterations: int = _number(8000, 1, MAX_ITERATIONS, free=True)
     iterations_per_call: int = _number(1, 1)
     log_every: int = _number(10, 1, free=True)
     checkpoint_every: int = _number(200, 1, free=True)
     keep_checkpoints: int = _number(3, 1, free=True)
+    on_overflow: Literal["stop", "warn"] = _free("stop")
     hang_limit_s: float = _number(300.0, POSITIVE, free=True)
     ppo: PpoConfig = dataclasses.field(default_factory=PpoConfig)
 
@@ -175,7 +185,18 @@ def preset(name: str, task: str = "crawl") -> TrainConfig:
     return dataclasses.replace(config, ppo=small)
 
 
+def free_fields(config: Any) -> set[str]:
+    """Returns the names of those fields that a resumed run may change.
+
+    Args:
+        config: settings of run or task; what is no dataclass has no such field.
+    """
+    if not dataclasses.is_dataclass(config):
+        return set()
+    return {f.name for f in dataclasses.fields(config) if "free" in f.metadata}
+
+
 def bound_fields(config: TrainConfig) -> dict[str, Any]:
     """Returns those fields, as plain data, that a resumed run must share."""
-    fields = {f.name for f in dataclasses.fields(config) if "free" not in f.metadata}
-    return {k: v for k, v in to_dict(config).items() if k in fields}
+    free = free_fields(config)
+    return {k: v for k, v in to_dict(config).items() if k not in free}

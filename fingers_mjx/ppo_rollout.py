@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from envs.base import State
+from envs.physics.room import ROOM
 from fingers_mjx.ppo_brax import (
     PPONetworkParams,
     PPONetworks,
@@ -111,6 +112,8 @@ def unroll(
     last_obs, last_ok = screen(state.obs)
     ok = jnp.concatenate([steps.pop("obs_ok"), last_ok[None]])
     totals = jax.tree.map(lambda x: jnp.sum(x, axis=0), steps.pop("totals"))
+    for name, hit in steps.pop("overflow").items():
+        totals[f"{name}_worlds"] = count(jnp.any(hit, axis=0))
     rollout = _seal(steps, ok[:-1] & ok[1:], last_obs["privileged_state"])
     return state, rollout, totals | rollout_totals(rollout)
 
@@ -144,6 +147,7 @@ def _outcome(state: State) -> dict[str, Any]:
         "truncation": state.info["truncation"],
         "fault": jnp.where(reported, 1, jnp.where(finite, 0, 2)),
         "totals": _step_totals(state, ~reported & finite),
+        "overflow": {k: state.metrics[k] > 0 for k in ROOM if k in state.metrics},
     }
 
 

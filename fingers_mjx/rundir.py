@@ -14,7 +14,7 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
@@ -109,18 +109,21 @@ def saved_bound(path: Path) -> dict[str, Any]:
     return bound
 
 
-def check_bound(path: Path, current: Mapping[str, Any]) -> None:
+def check_bound(
+    path: Path, current: Mapping[str, Any], free: Collection[str] = ()
+) -> None:
     """Raises InputError if the run at `path` was made with something else.
 
     Args:
         path: of the run.
         current: nested names and values that must be the same.
+        free: dotted names of values that may differ all the same.
 
     Raises:
         InputError: naming the first field that differs, its saved and current value.
     """
     saved, now = _flat(saved_bound(path)), _flat(json.loads(_json(current)))
-    for name in sorted(saved.keys() | now.keys()):
+    for name in sorted((saved.keys() | now.keys()) - set(free)):
         was, found = saved.get(name, "nothing"), now.get(name, "nothing")
         if was != found:
             valid = f"{was} as saved (--warm-start takes the policy across)"

@@ -10,7 +10,7 @@ from envs.hand.hand_file import HandFile
 from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
-from fingers_mjx.ppo_config import TrainConfig
+from fingers_mjx.ppo_config import TrainConfig, free_fields
 from fingers_mjx.ppo_config_check import check_config
 from fingers_mjx.ppo_rollout import BatchEnv
 from fingers_mjx.ppo_state import Carry, strong
@@ -72,7 +72,8 @@ def train(
         on_progress: told the events of `fingers_mjx.progress`, from any thread.
 
     Raises:
-        InputError: for settings, directories or checkpoints that do not fit.
+        InputError: for settings, directories or checkpoints that do not fit, or when
+            contacts were dropped for want of room (`TrainConfig.on_overflow`).
         Diverged: when too many updates in a row were not finite.
         Interrupted: after SIGINT or SIGTERM, with a checkpoint written.
         OutOfSpace: when the disk is full; earlier checkpoints are intact.
@@ -94,13 +95,16 @@ def train(
         env = make_env(config.num_envs)
         shared = bound(env, config, env_config, identity or {})
         if resume:
-            check_bound(path, shared)
+            free = {f"env.{name}" for name in free_fields(env_config)}
+            check_bound(path, shared, free)
         session = Session(env, config)
         newest = _newest(path, say) if resume else None
         start = _restored(session, newest) if newest else _fresh(session, warm_start)
         record_run(path, {"train": config, "env": env_config}, shared, hand)
         with MetricsLog(path, start[1]) as log:
-            desk = Desk(path, shared, log, on_progress, stop, watchdog, ticker)
+            desk = Desk(
+                path, shared, env_config, log, on_progress, stop, watchdog, ticker
+            )
             saved = Loop(session, desk, *start, saved=newest).run()
     rows = read_metrics(path / "metrics.jsonl")
     return Result(path, saved, int(saved.name), rows[-1])

@@ -11,10 +11,12 @@ from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
 from fingers_mjx.ppo_state import Carry
+from fingers_mjx.ppo_totals import means
 from fingers_mjx.progress import OnProgress, Ticker
 from fingers_mjx.rundir_metrics import MetricsLog
 from fingers_mjx.train_dump import dump_state
 from fingers_mjx.train_errors import Diverged, Interrupted
+from fingers_mjx.train_room import overflows
 from fingers_mjx.train_row import Window, speed
 from fingers_mjx.train_session import Report, Session
 
@@ -26,6 +28,7 @@ class Desk:
     Attributes:
         path: run directory.
         bound: what a resumed run must share.
+        env_config: settings of the task.
         log: learning curve.
         on_progress: told every event.
         stop: whether a signal asks the run to stop.
@@ -35,6 +38,7 @@ class Desk:
 
     path: Path
     bound: Mapping[str, Any]
+    env_config: Any
     log: MetricsLog
     on_progress: OnProgress
     stop: StopSignals
@@ -75,6 +79,7 @@ class Loop:
         self.carry, self.iteration = carry, iteration
         self.saved = saved
         self._flying: Report | None = None
+        self._flying_to = iteration
         self._window = Window()
         self._noted = -1
         self._calls = 0
@@ -86,6 +91,7 @@ class Loop:
 
         Raises:
             Diverged: when too many updates in a row were not finite.
+            InputError: when contacts were dropped and `on_overflow` is "stop".
             Interrupted: when a signal asked for it; a checkpoint has been written.
             OutOfSpace: when the disk is full.
         """
@@ -110,7 +116,7 @@ class Loop:
         self._window.sums.append(report.sums)
         self.saved = None
         self._land()
-        self._flying = report
+        self._flying, self._flying_to = report, self.iteration
         self._calls += 1
         if self._calls == 1:
             self._land()
@@ -130,9 +136,20 @@ class Loop:
         if self._flying is None:
             return
         self._health = self._flying.fetch_health()
+        if self.config.on_overflow == "stop":
+            figures = means(self.session.names, self._flying.fetch_sums())
+            self._tell_overflow(figures, f"iteration {self._flying_to}")
         self._flying = None
         if self._health["worst_streak"] >= self.config.ppo.max_bad_updates:
             raise self._divergence(self._health)
+
+    def _tell_overflow(self, figures: Mapping[str, float], when: str) -> None:
+        """Stops the run where contacts were dropped, or says so and goes on."""
+        worlds, settings = self.config.num_envs, self.desk.env_config
+        for error in overflows(figures, when, worlds, settings):
+            if self.config.on_overflow == "stop":
+                raise error
+            self.desk.on_progress({"event": "note", "text": str(error)})
 
     def _divergence(self, health: Mapping[str, int]) -> Diverged:
         """Saves the state for inspection and returns the error that tells of it."""
@@ -162,17 +179,7 @@ class Loop:
         self.desk.log.append(row)
         self.desk.on_progress({"event": "progress", **row})
         self._note_fault()
-        self._note_overflow(row.get("contact_overflow", 0.0))
-
-    def _note_overflow(self, share: float) -> None:
-        """Tells when MuJoCo Warp ran out of room and dropped contacts."""
-        if share > 0.0:
-            sentence = (
-                f"contact or constraint buffers were too small in {share:.2%} of the "
-                "control steps since the last row, and contacts were dropped there; "
-                "raise env.contacts_per_world or env.constraints_per_world"
-            )
-            self.desk.on_progress({"event": "note", "text": sentence})
+        self._tell_overflow(figures, "since the last row")
 
     def _note_fault(self) -> None:
         """Tells of the latest step that was set aside, once."""

@@ -9,6 +9,8 @@
     episode/ended, failed   number of episodes that ended; of those, by a failure
     reward/<term>           mean per control step, weighted and times the interval
     <any other metric>      of the environment, mean per control step
+    …_overflow_worlds       worlds in which Warp dropped something, see
+                            `envs.physics.room`
     loss/…, kl, grad_norm   means over the updates that were applied
     learning_rate           mean over the updates
     policy/std, entropy     of the action noise [nat]

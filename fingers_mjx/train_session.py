@@ -7,7 +7,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State
 from envs.config import to_dict
@@ -47,6 +47,10 @@ class Report:
 
     sums: Array
     health: Array
+
+    def fetch_sums(self) -> Float[np.ndarray, "k 2"]:
+        """Waits for the call and returns sum and weight of each figure."""
+        return np.asarray(self.sums)
 
     def fetch_health(self) -> dict[str, int]:
         """Waits for the call and returns its health."""

@@ -8,32 +8,47 @@ import pytest
 from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError
 from envs.physics import PhysicsOutput
+from envs.physics.room import ROOM
 from envs.plant import check_interval
 
 
 class TooSmall:
-    """The cpu backend, which drops contacts of hands that stand beyond x = 0.5 m."""
+    """The cpu backend, with Warp's bits for hands that stand beyond x = 0.5 m."""
 
-    def __init__(self, inner):
-        self.inner = inner
+    def __init__(self, inner, bits):
+        self.inner, self.bits = inner, bits
         self.mj_model, self.n_substeps = inner.mj_model, inner.n_substeps
 
     def step(self, fields, state, ctrl):
         output = self.inner.step(fields, state, ctrl)
-        return output.replace(overflow=jnp.where(state.qpos[0] > 0.5, 12, 0))
+        return output.replace(overflow=jnp.where(state.qpos[0] > 0.5, self.bits, 0))
 
 
-def test_dropped_contacts_are_told_by_the_environment():
-    """T9: Warp's overflow bits become a metric of the step, also of an invalid one."""
+@pytest.mark.parametrize(
+    ("bits", "told"),
+    [
+        (4, {"contact_overflow"}),  # OverflowType.BROADPHASE
+        (8 | 16, {"contact_overflow"}),
+        (1, {"constraint_overflow"}),  # OverflowType.NEFC
+        (2, {"constraint_overflow"}),
+        (1 | 8, {"contact_overflow", "constraint_overflow"}),
+    ],
+)
+def test_dropped_contacts_are_told_by_the_environment(bits, told):
+    """T9: Warp's overflow bits become metrics of the step, also of an invalid one."""
     env = CrawlEnv()
-    env.plant = dataclasses.replace(env.plant, physics=TooSmall(env.plant.physics))
+    physics = TooSmall(env.plant.physics, bits)
+    env.plant = dataclasses.replace(env.plant, physics=physics)
     state = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 4))
-    np.testing.assert_array_equal(state.metrics["contact_overflow"], 0)
+    for name in ROOM:
+        np.testing.assert_array_equal(state.metrics[name], 0)
     qpos = state.data.qpos.at[:, 0].set(jnp.array([0.0, 1.0, 0.0, 1.0]))
     qvel = state.data.qvel.at[2:].set(jnp.nan)
     state = state.replace(data=state.data.replace(qpos=qpos, qvel=qvel))
     after = jax.jit(jax.vmap(env.step))(state, jnp.zeros((4, 20)))
-    np.testing.assert_array_equal(after.metrics["contact_overflow"], [0, 1, 0, 1])
+    for name in ROOM:
+        hit = [0, 1, 0, 1] if name in told else 0
+        np.testing.assert_array_equal(after.metrics[name], hit)
     np.testing.assert_array_equal(after.info["invalid"], [0, 0, 1, 1])
 
 

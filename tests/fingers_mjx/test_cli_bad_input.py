@@ -52,6 +52,7 @@ def refuse(here, capsys, argv):
     return said.err
 
 
+FILE = "run/run.json/below"
 SETTINGS = [
     (["train"], ["TASK", "crawl"]),
     (["train", "crawll"], ["crawll", "crawl"]),
@@ -72,7 +73,7 @@ SETTINGS = [
     (["train", "crawl", "--set", "env.control_dt_s=0.007"], ["control_dt_s", "0.007"]),
     (["train", "crawl", "--hand", "no.yaml"], ["no.yaml", "No such file"]),
     (["train", "crawl", "--out", "run"], ["run", "in use", "--resume"]),
-    (["train", "crawl", "--out", "bundle/policy.onnx"], ["policy.onnx", "a file"]),
+    (["train", "crawl", "--out", "bundle/policy.onnx"], ["policy.onnx", "Not a dir"]),
     (["train", "crawl", "--warm-start", "no"], ["no", "checkpoint"]),
     (["train", "--resume", "bundle"], ["bundle", "no run", "fingers train"]),
     (["train", "--resume", "run", "--seed", "5"], ["run", "seed", "5", "0, as saved"]),
@@ -99,6 +100,29 @@ SETTINGS = [
     (["hand", "stance", "--hand", "no.yaml"], ["no.yaml", "No such file"]),
     (["hand", "show", "--hand", "bundle/config.yaml"], ["bundle/config.yaml"]),
     (["dance"], ["dance", "train"]),
+    (["train", "crawl", "--set", "task=recovery"], ["task", "recovery", "TASK"]),
+    (["train", "crawl", "--set", "preset=fast"], ["preset", "fast", "--preset"]),
+    (["train", "crawl", "--set", "num_envs=100000000000"], ["num_envs", "1.04858e+06"]),
+    (["train", "crawl", "--out", FILE], ["--out", FILE, "Not a directory"]),
+    (["train", "crawl", "--out", "/proc/run"], ["--out", "/proc", "No such file"]),
+    (["train", "crawl", "--hand", "run"], ["run", "Is a directory"]),
+    (["train", "crawl", "--hand", "bundle/policy.onnx"], ["policy.onnx", "UTF-8"]),
+    (["eval", FILE], [FILE, "no such file"]),
+    (["eval", "run/run.json"], ["run.json", "SHA-256"]),
+    (["eval", "bundle", "--json", "run"], ["--json", "run", "a directory"]),
+    (["eval", "bundle", "--json", FILE], ["--json", FILE, "Not a directory"]),
+    (["eval", "bundle", "--json", "/proc/x.json"], ["--json", "/proc/x.json"]),
+    (["eval", "bundle", "--out", FILE], ["--out", FILE]),
+    (["eval", "bundle", "--out", "bundle/policy.onnx"], ["--out", "policy.onnx"]),
+    (["eval", "bundle", "--set", "env.episode_s=1e9"], ["env.episode_s", "1e+06"]),
+    (["play", "bundle", "--json", "run"], ["--json", "run", "a directory"]),
+    (["play", "bundle", "--video", f"{FILE}.mp4"], ["--video", FILE]),
+    (["play", "run"], ["run", "without policy.onnx"]),
+    (["export", "run", "--out", FILE], ["--out", FILE]),
+    (["hand", "show", "--out", FILE], ["--out", FILE]),
+    (["hand", "stance", "--out", "run"], ["--out", "run", "a directory"]),
+    (["demo", "--out", FILE], ["--out", FILE]),
+    (["demo", "--policy", "run"], ["run", "without policy.onnx"]),
 ]
 
 

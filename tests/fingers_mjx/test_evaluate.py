@@ -188,14 +188,16 @@ def test_the_step_compiles_once():
     assert len(traced) == 1
 
 
-def test_record_marks_undesired_contact_and_power():
+def test_record_marks_undesired_contact_power_and_what_was_dropped():
     state = GlidingHands((0, 0), auto_reset=False).reset(jax.random.key(0))
     touching = state.signals.replace(
         link_contact=state.signals.link_contact.at[0, 3].set(1.0),
         palm_contact=jnp.array([0.0, 0.0]),
         torque_nm=state.signals.torque_nm.at[:, 0].set(-1.0),
     )
-    found = record(state.replace(signals=touching))
+    dropped = {"constraint_overflow": jnp.array([0.0, 1.0])}
+    found = record(state.replace(signals=touching, metrics=dropped))
+    np.testing.assert_array_equal(found.overflow, [[False, False], [False, True]])
     np.testing.assert_array_equal(found.undesired, [True, False])
     np.testing.assert_allclose(found.power_w, 19 * 0.25 + 0.5)
 

@@ -1,5 +1,6 @@
 """What an evaluation changes of the training, and which episode it shows."""
 
+import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -10,8 +11,12 @@ from cli_setup import make_setup
 
 from envs.commands import sample_command
 from envs.errors import InputError
+from fingers_mjx import evaluate_source as module
+from fingers_mjx.evaluate import EpisodeTable
+from fingers_mjx.evaluate_record import Trace
 from fingers_mjx.evaluate_source import (
     check_policy_settings,
+    evaluate_source,
     nominal,
     typical_episode,
     with_command,
@@ -60,6 +65,31 @@ def test_settings_of_the_learner_are_refused():
     check_policy_settings(["env.episode_s=3"])
     with pytest.raises(InputError, match=r"seed=1.*env\.FIELD"):
         check_policy_settings(["env.episode_s=3", "seed=1"])
+
+
+@pytest.mark.parametrize(
+    ("column", "setting"),
+    [
+        (0, r"contacts_per_world: found 48; valid: about 96"),
+        (1, r"constraints_per_world: found 128; valid: about 256"),
+    ],
+)
+def test_an_evaluation_without_all_contacts_has_no_result(monkeypatch, column, setting):
+    """T9: one step of one episode is enough; what comes after its end is not."""
+    shape = (4, 3)
+    done = np.zeros(shape, bool)
+    done[2, 1] = True
+    dropped = np.zeros((*shape, 2), bool)
+    fields = {f.name: np.zeros(shape) for f in dataclasses.fields(Trace)}
+    fields |= {"done": done, "failed": done, "overflow": dropped, "extra": {}}
+    table = EpisodeTable({}, Trace(**fields), 0.02)
+    monkeypatch.setattr(module, "evaluate", lambda *args: table)
+    source = PolicySource(Path("run"), make_setup(), None, 0)
+    dropped[3, 1, column] = True
+    assert evaluate_source(source, 3) is table
+    dropped[1, 1, column] = True
+    with pytest.raises(InputError, match=rf"in 1 of 3 episodes: env\.{setting}"):
+        evaluate_source(source, 3)
 
 
 @pytest.mark.parametrize(
