@@ -9,6 +9,7 @@ from jaxtyping import Array, Bool, Float
 
 from envs.commands import CommandConfig, sample_command
 from envs.errors import InputError
+from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.hand_env import HandEnv
@@ -23,12 +24,9 @@ from envs.start import near_stance
 from envs.streams import stream
 from rewards import (
     CRAWL,
-    LiftParams,
     RewardTable,
-    footprint_step,
     init_footprint_memory,
     init_lift_memory,
-    lift_step,
     safe_norm,
 )
 
@@ -119,33 +117,11 @@ class Crawl(BareTask):
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
     ) -> tuple[Memory, dict[str, Array]]:
         """Steps the footprint and lift memories."""
-        lasting = memory.lasting
-        footprint = footprint_step(lasting.footprint, signals.tip_pos_v)
-        footprint = jax.tree.map(
-            lambda new, old: jnp.where(valid, new, old), footprint, lasting.footprint
-        )
-        lift, lift_magnitude = lift_step(
-            memory.lift,
-            signals.tip_vel_v[:, 2],
-            signals.tip_force_n,
-            signals.command[:2],
-            self.config.control_dt_s,
-            LiftParams(),
-        )
-        extras = {
-            "footprint_target_v": footprint.target_v,
-            "lift_magnitude": lift_magnitude,
-        }
-        lasting = lasting.replace(footprint=footprint)
-        return memory.replace(lasting=lasting, lift=lift), extras
+        return step_gait(memory, signals, valid, self.config.control_dt_s)
 
     def terminated(self, signals: Signals) -> Bool[Array, ""]:
         """Palm contact, or V tilted beyond the limits (paper)."""
-        limits = jnp.deg2rad(
-            jnp.array([self.config.max_roll_deg, self.config.max_pitch_deg])
-        )
-        fallen = jnp.any(jnp.abs(signals.tilt_rad) > limits)
-        return fallen | (signals.palm_contact > 0)
+        return fallen(signals, self.config)
 
     def advance(self, memory: Memory, signals: Signals) -> Memory:
         """Draws the next command when its time has come, and resets the lift memory."""

@@ -19,6 +19,7 @@ from envs.camera import (
     step_camera,
 )
 from envs.errors import check_ordered
+from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.hand_env import HandEnv
@@ -39,12 +40,9 @@ from envs.start import near_stance
 from envs.streams import stream
 from rewards import (
     PUSH,
-    LiftParams,
     RewardTable,
-    footprint_step,
     init_footprint_memory,
     init_lift_memory,
-    lift_step,
     safe_norm,
 )
 
@@ -230,33 +228,11 @@ class Push(BareTask):
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
     ) -> tuple[Memory, dict[str, Array]]:
         """Steps the memories of the crawl's rewards."""
-        lasting = memory.lasting
-        footprint = footprint_step(lasting.footprint, signals.tip_pos_v)
-        footprint = jax.tree.map(
-            lambda new, old: jnp.where(valid, new, old), footprint, lasting.footprint
-        )
-        lift, lift_magnitude = lift_step(
-            memory.lift,
-            signals.tip_vel_v[:, 2],
-            signals.tip_force_n,
-            signals.command[:2],
-            self.config.control_dt_s,
-            LiftParams(),
-        )
-        extras = {
-            "footprint_target_v": footprint.target_v,
-            "lift_magnitude": lift_magnitude,
-        }
-        lasting = lasting.replace(footprint=footprint)
-        return memory.replace(lasting=lasting, lift=lift), extras
+        return step_gait(memory, signals, valid, self.config.control_dt_s)
 
     def terminated(self, signals: Signals) -> Bool[Array, ""]:
         """Palm contact, or V tilted beyond the limits, as in crawling."""
-        limits = jnp.deg2rad(
-            jnp.array([self.config.max_roll_deg, self.config.max_pitch_deg])
-        )
-        fallen = jnp.any(jnp.abs(signals.tilt_rad) > limits)
-        return fallen | (signals.palm_contact > 0)
+        return fallen(signals, self.config)
 
     def advance(self, memory: Memory, signals: Signals) -> Memory:
         """The next camera sample, the tracker's and the guide's answer to the state."""

@@ -17,7 +17,7 @@ TOP_RATE_RPS = 0.45
 ARRIVED_M = 0.010
 _GAIN_PER_S = 2.0
 _TURN_GAIN_PER_S = 1.5
-_GAP_M = 0.05
+_GAP_M = 0.07
 _BESIDE_M = 0.02
 _ASKEW_RAD = 0.5
 
@@ -29,7 +29,7 @@ def guide(
 
     With e the way of the pocket to the cube and u the direction of the target: the part
     of e across u is closed, and along u the hand goes ahead if it is behind the cube
-    and looks along u, and otherwise to a point 5 cm behind the cube. It turns toward
+    and looks along u, and otherwise to a point 7 cm behind the cube. It turns toward
     u. At the target it stands.
 
     Args:

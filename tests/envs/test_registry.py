@@ -16,7 +16,7 @@ def test_unknown_task_is_named_with_the_nearest():
 def test_a_task_from_outside_joins_and_cannot_replace_another(monkeypatch):
     monkeypatch.setattr(registry, "_TASKS", dict(registry._TASKS))
     register("creep", Task(lambda: CrawlConfig(action_scale_rad=0.01), CrawlEnv))
-    assert task_names() == ("crawl", "recovery", "creep")
+    assert task_names()[-1] == "creep"
     env = make_batch("creep", 3, auto_reset=False)
     assert (env.num_envs, env.config.action_scale_rad) == (3, 0.01)
     with pytest.raises(ValueError, match="'creep' is registered already"):
