@@ -85,8 +85,8 @@ class PushConfig(HandSettings):
     reset_speed_mps: float = field(default=0.05, metadata={"unit": "m/s", "low": 0.0})
     camera: CameraConfig = field(default_factory=CameraConfig)
     # The cube stands on four contacts and lies near all fingers.
-    contacts_per_world: int = field(default=80, metadata={"low": 1, "free": True})
-    constraints_per_world: int = field(default=192, metadata={"low": 1, "free": True})
+    contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
+    constraints_per_world: int = field(default=224, metadata={"low": 1, "free": True})
 
     def __post_init__(self) -> None:
         super().__post_init__()

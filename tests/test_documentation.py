@@ -92,7 +92,8 @@ def test_presets_in_the_training_guide_are_those_of_the_code():
 
 
 @pytest.mark.parametrize(
-    ("guide", "table"), [("environment.md", "CRAWL"), ("tasks.md", "RECOVERY")]
+    ("guide", "table"),
+    [("environment.md", "CRAWL"), ("tasks.md", "RECOVERY"), ("pushing.md", "PUSH")],
 )
 def test_rewards_in_the_guides_are_those_of_the_code(guide, table):
     import rewards
