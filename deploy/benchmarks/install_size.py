@@ -2,10 +2,12 @@
 
     python deploy/benchmarks/install_size.py
 
-builds the wheel and installs it into fresh environments, without and with ONNX Runtime.
+builds the wheel and installs it into fresh environments, without and with ONNX Runtime;
+on Debian also beside the NumPy of the system, which is smaller than that of PyPI.
 """
 
 import json
+import os
 import platform
 import shutil
 import subprocess
@@ -14,6 +16,8 @@ import tempfile
 from pathlib import Path
 
 ROBOT = "aarch64-manylinux_2_28"
+DEBIAN = ("python3-numpy", "libblas3", "liblapack3", "libgfortran5", "libquadmath0")
+ONNX = ("onnxruntime", "flatbuffers", "packaging", "protobuf")
 DEPLOY = Path(__file__).parents[1]
 _IMPORT = """
 import time
@@ -23,16 +27,20 @@ print(time.process_time() - start)
 """
 
 
-def _run(*program: str | Path) -> str:
+def _run(*program: str | Path, env: dict[str, str] | None = None) -> str:
     done = subprocess.run(
-        [str(word) for word in program], check=True, capture_output=True, text=True
+        [str(word) for word in program],
+        check=True,
+        capture_output=True,
+        text=True,
+        env={**os.environ, **(env or {})},
     )
     return done.stdout
 
 
 def size_mb(folder: Path) -> float:
     """Size of the files of a folder, 10⁶ bytes."""
-    files = (file for file in folder.rglob("*") if file.is_file())
+    files = (f for f in folder.rglob("*") if f.is_file() and not f.is_symlink())
     return round(sum(file.stat().st_size for file in files) / 1e6, 1)
 
 
@@ -42,13 +50,52 @@ def measure(wheel: Path, extra: str, folder: Path) -> dict:
     python = folder / "bin" / "python"
     _run("uv", "pip", "install", "-q", "--python", python, f"{wheel}{extra}")
     site = next((folder / "lib").glob("python*")) / "site-packages"
-    _run(python, "-c", _IMPORT)
-    times = sorted(float(_run(python, "-c", _IMPORT)) for _ in range(5))
     return {
         "machine": platform.machine(),
         **_sizes(site, extra),
-        "import_s": round(times[2], 3),
+        "import_s": _import_s(python),
     }
+
+
+def measure_debian(wheel: Path, extra: str, folder: Path) -> dict:
+    """The same beside the NumPy of Debian, with the libraries that it needs."""
+    system, site = folder / "system", folder / "site"
+    system.mkdir(parents=True)
+    subprocess.run(
+        ["apt-get", "download", "-q", *DEBIAN],
+        cwd=system,
+        check=True,
+        capture_output=True,
+    )
+    for package in system.glob("*.deb"):
+        _run("dpkg", "-x", package, system)
+        package.unlink()
+    more = ONNX if extra else ()
+    python = Path("/usr/bin/python3")
+    _run(
+        *("uv", "pip", "install", "-q", "--python", python, "--target", site),
+        *("--no-deps", wheel, *more),
+    )
+    libraries = {str(file.parent) for file in system.rglob("lib*.so.*")}
+    paths = [system / "usr" / "lib" / "python3" / "dist-packages", site]
+    env = {
+        "LD_LIBRARY_PATH": ":".join(sorted(libraries)),
+        "PYTHONPATH": ":".join(map(str, paths)),
+    }
+    size = size_mb(system) + size_mb(site)
+    return {
+        "machine": f"{platform.machine()}, NumPy of the system (Debian)",
+        **_sizes(site, extra),
+        "installed_mb": round(size, 1),
+        "import_s": _import_s(python, env),
+    }
+
+
+def _import_s(python: Path, env: dict[str, str] | None = None) -> float:
+    """Median time of an import after the first one [s]."""
+    _run(python, "-c", _IMPORT, env=env)
+    times = sorted(float(_run(python, "-c", _IMPORT, env=env)) for _ in range(5))
+    return round(times[2], 3)
 
 
 def measure_robot(wheel: Path, extra: str, folder: Path) -> dict:
@@ -93,6 +140,11 @@ def main() -> int:
             measure_robot(wheel, extra, base / f"robot{i}")
             for i, extra in enumerate(("", "[onnx]", "[onnx,hand]"))
         ]
+        if shutil.which("apt-get"):
+            results += [
+                measure_debian(wheel, extra, base / f"debian{i}")
+                for i, extra in enumerate(("", "[onnx]"))
+            ]
     print(json.dumps(results, indent=1))
     return 0
 

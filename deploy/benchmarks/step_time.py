@@ -13,7 +13,7 @@ import sys
 import time
 
 import numpy as np
-from hand_files import marching_bundle
+from hand_files import WALKING
 
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
@@ -93,14 +93,14 @@ def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
 def main() -> int:
     """Runs the measurement for both runtimes and prints it as JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bundle")
+    parser.add_argument("--bundle", default=WALKING)
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--no-realtime", action="store_true")
     options = parser.parse_args()
     os.sched_setaffinity(0, {max(os.sched_getaffinity(0))})
     if not options.no_realtime:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(40))
-    bundle = load_bundle(options.bundle) if options.bundle else marching_bundle()
+    bundle = load_bundle(options.bundle)
     steps = round(options.minutes * 3000)
     print(json.dumps([measure(bundle, r, steps) for r in ("onnxruntime", "numpy")]))
     return 0

@@ -1,10 +1,10 @@
 """Walking quality against disturbances between hand and policy, as one figure.
 
-    python deploy/benchmarks/walking_quality.py --bundle policies/crawl --out OUT
+    python deploy/benchmarks/walking_quality.py --out OUT
 
-writes `<out>.png` and `<out>.json`. Quality is that of the policy with the supervisor's
-limits on age and freezing off; where the supervisor as it is stops the hand, the point
-is marked.
+writes `<out>.png` and `<out>.json` for the committed policy. Quality is that of the
+policy with the supervisor's limits on age and freezing off; where the supervisor as it
+is stops the hand, the point is marked.
 """
 
 import argparse
@@ -21,7 +21,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from fault_lab import Lab
 from fault_links import LossyLink
-from hand_files import marching_bundle, write_model
+from hand_files import WALKING, write_model
 
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.reading import Health
@@ -154,12 +154,12 @@ def draw(results: dict, path: Path) -> None:
 def main() -> int:
     """Runs the measurement and writes figure and numbers."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bundle")
+    parser.add_argument("--bundle", type=Path, default=WALKING)
     parser.add_argument("--seconds", type=float, default=10.0)
     parser.add_argument("--trials", type=int, default=3)
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    bundle = load_bundle(options.bundle) if options.bundle else marching_bundle()
+    bundle = load_bundle(options.bundle)
     with tempfile.TemporaryDirectory() as folder:
         model = write_model(Path(folder) / "hand.xml")
         lab = Lab(model, (bundle,), sticks=(1.0, 0.0, 0.0), loop_hz=500)

@@ -6,7 +6,7 @@ import onnx
 import pytest
 from onnx import TensorProto, helper
 
-from fingers_deploy import BundleError, load_bundle
+from fingers_deploy import BundleError, PolicyController, load_bundle
 from fingers_deploy.bundle import (
     MANIFEST_KEY,
     check_joint_order,
@@ -100,6 +100,29 @@ def test_another_policy_with_the_same_shapes_is_refused(
     (bundle_dir / "policy.onnx").write_bytes(other.model)
     with pytest.raises(BundleError, match="another manifest"):
         load_bundle(bundle_dir)
+
+
+def test_a_policy_that_runs_does_not_see_its_file_change(bundle_dir, bundle):
+    """S16: read once; swapped, cut or overwritten in place, the old one goes on."""
+    path = bundle_dir / "policy.onnx"
+    for runtime in ("onnxruntime", "numpy"):
+        path.write_bytes(bundle.model)
+        running = PolicyController(load_bundle(bundle_dir), runtime)
+        undisturbed = PolicyController(bundle, runtime)
+        rng = np.random.default_rng(SEED)
+        for k in range(20):
+            if k == 10:
+                with path.open("r+b") as file:
+                    file.write(rng.bytes(len(bundle.model) // 2))
+                    file.truncate()
+            pos, gyro = rng.normal(0, 0.1, 20), rng.normal(0, 0.1, 3)
+            found, wanted = (
+                c.step(pos, [0.0, 0.0, -1.0], gyro, [0.1, 0.0, 0.0])
+                for c in (running, undisturbed)
+            )
+            np.testing.assert_array_equal(found, wanted)
+        with pytest.raises(BundleError):
+            load_bundle(bundle_dir)
 
 
 def test_missing_files_are_named(tmp_path, bundle_dir):

@@ -5,6 +5,7 @@ import sys
 
 import numpy as np
 import pytest
+from fuzz_bundles import loaded_unchecked
 from fuzz_bundles import measure as damage_bundles
 
 from fingers_deploy.cli.main import main
@@ -54,14 +55,16 @@ def test_bad_input_is_one_sentence_and_status_2(bundle_dir, capsys, arguments, w
     assert said.out == "" and len(said.err.splitlines()) == 1 and words in said.err
 
 
-def test_damaged_bundles_are_refused_before_anything_is_opened():
-    result = damage_bundles(300, seed=1)
+def test_damaged_bundles_are_refused_before_anything_is_opened(marching):
+    result = damage_bundles(marching, 300, seed=1)
     assert result["accepted"] == 0 and result["not_one_line"] == 0
+    # Negative control: without our checks nearly all of them load.
+    assert loaded_unchecked(marching, 50, seed=1) >= 45
 
 
 @pytest.mark.slow
-def test_ten_thousand_damaged_bundles():
-    result = damage_bundles(10_000, seed=2)
+def test_ten_thousand_damaged_bundles(marching):
+    result = damage_bundles(marching, 10_000, seed=2)
     print(json.dumps(result))
     assert result["accepted"] == 0 and result["not_one_line"] == 0
 
