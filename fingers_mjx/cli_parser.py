@@ -177,6 +177,13 @@ def _play(commands) -> None:
         "bundle", metavar="BUNDLE", type=Path, help="bundle directory or policy.onnx"
     )
     parser.add_argument(
+        "--then",
+        type=Path,
+        metavar="BUNDLE",
+        help="after a recovery: policy that takes over once the hand stands, under "
+        "--command (default: its fastest forward)",
+    )
+    parser.add_argument(
         "--video", type=Path, metavar="FILE", help=".mp4, .webp or .gif to write"
     )
     parser.add_argument(

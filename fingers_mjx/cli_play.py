@@ -6,13 +6,20 @@ import sys
 from typing import Any
 
 from envs.errors import InputError, one_of
+from fingers_deploy import Bundle
 from fingers_mjx.cli_paths import check_file
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import document, nominal, with_command
-from fingers_mjx.play import Player
+from fingers_mjx.play import Player, Schedule
 from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
+from fingers_mjx.play_recovery import (
+    RecoveryPlayer,
+    check_chain,
+    is_recovery,
+    story,
+)
 from fingers_mjx.play_video import VIDEO_SUFFIXES, write_video
 from fingers_mjx.policy_source import PolicySource, load_bundle_setup
 from fingers_mjx.run_setup import Setup, make_env
@@ -27,9 +34,9 @@ def run(args: argparse.Namespace) -> int:
     check_file("--video", args.video)
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
-    player = Player(make_env(setup, 1, "cpu"), bundle, args.runtime)
+    player = _player(args, setup, bundle)
     steps = max(1, round(args.seconds / player.env.dt))
-    schedule = schedule_of(args.commands, steps) if args.commands else None
+    schedule = _schedule(args, bundle, steps)
     with counting(sys.stderr, "playing", "episodes") as progress:
         played = play_episodes(
             player, args.episodes, steps, args.seed, schedule, progress
@@ -43,13 +50,43 @@ def run(args: argparse.Namespace) -> int:
     if args.video:
         _film(args, player, played)
     print_measures(summary)
+    if isinstance(player, RecoveryPlayer):
+        print("first episode:", story(played.first, player.env.dt, _then_name(args)))
     return 0
+
+
+def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
+    """Returns what plays the bundle; recoveries end as the shim ends them."""
+    env = make_env(setup, 1, "cpu")
+    if args.then is None and not is_recovery(bundle):
+        return Player(env, bundle, args.runtime)
+    commands = args.commands or []
+    if args.then is None and commands:
+        raise InputError("--command", "", commands[0], "--then: recovery has none")
+    if len(commands) > 1:
+        raise InputError("--command", "", f"{len(commands)} commands", "one")
+    then = None if args.then is None else load_bundle_setup(args.then)[0]
+    if then is not None:
+        check_chain(bundle, then)
+    command = tuple(commands[0]) if commands else None
+    return RecoveryPlayer(env, bundle, then, command, args.runtime)
+
+
+def _schedule(args: argparse.Namespace, bundle: Bundle, steps: int) -> Schedule | None:
+    """Returns the command of each step; a recovery has none."""
+    if not args.commands or is_recovery(bundle):
+        return None
+    return schedule_of(args.commands, steps)
+
+
+def _then_name(args: argparse.Namespace) -> str | None:
+    return None if args.then is None else args.then.absolute().name
 
 
 def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     """Returns the worlds to play in."""
     setup = trained if args.randomize else nominal(trained)
-    if args.commands and len(args.commands) == 1:
+    if args.commands and len(args.commands) == 1 and args.then is None:
         setup = with_command(setup, args.commands[0])
     if args.friction is None:
         return setup
@@ -74,6 +111,7 @@ def _conditions(args: argparse.Namespace, played: Session) -> dict[str, Any]:
     return {
         "loop": "C MuJoCo through fingers_deploy",
         "runtime": args.runtime,
+        "then": _then_name(args),
         "seconds": args.seconds,
         "commands": args.commands,
         "randomize": args.randomize,

@@ -80,9 +80,18 @@ def _captioned(
 
 
 def _text(played: Played, step: int, dt_s: float) -> str:
-    """Returns time and command of a pose."""
-    x, y, turn = played.trace.command[min(step, len(played.trace.command) - 1)]
-    return (
-        f"{step * dt_s:4.1f} s   command: forward {x:+.2f} m/s, left {y:+.2f} m/s, "
-        f"turn {turn:+.2f} rad/s"
-    )
+    """Returns time and command of a pose, or how far a recovery has come."""
+    row = min(step, len(played.trace.command) - 1)
+    x, y, turn = played.trace.command[row]
+    words = f"command: forward {x:+.2f} m/s, left {y:+.2f} m/s, turn {turn:+.2f} rad/s"
+    if "settling" in played.trace.extra and not np.any((x, y, turn)):
+        words = _stage(played, row)
+    return f"{step * dt_s:4.1f} s   {words}"
+
+
+def _stage(played: Played, row: int) -> str:
+    """Returns how far a recovery has come."""
+    now = {name: values[row] for name, values in played.trace.extra.items()}
+    if not now["settling"]:
+        return f"getting up, tilt {np.degrees(now['tilt_rad_v']):.0f} deg"
+    return "in the stance" if now["settled"] else "upright: settling into the stance"

@@ -43,15 +43,15 @@ def make_setup(**env_changes) -> Setup:
     return dataclasses.replace(setup, env=dataclasses.replace(setup.env, **env_changes))
 
 
-def random_weights(seed=3, clip=1.0, gain=0.3) -> PolicyWeights:
+def random_weights(seed=3, clip=1.0, gain=0.3, inputs=392) -> PolicyWeights:
     """A policy that moves all joints without throwing the hand over at once."""
     rng = np.random.default_rng(seed)
-    sizes = ((392, 16), (16, 20))
+    sizes = ((inputs, 16), (16, 20))
     layers = tuple(
         (gain * rng.normal(size=size) / size[0] ** 0.5, 0.1 * rng.normal(size=size[1]))
         for size in sizes
     )
-    mean, std = rng.normal(0, 0.1, 392), rng.uniform(0.5, 1.5, 392)
+    mean, std = rng.normal(0, 0.1, inputs), rng.uniform(0.5, 1.5, inputs)
     return PolicyWeights(layers, mean, std, clip)
 
 
@@ -66,12 +66,13 @@ def make_bundle(path: Path, setup: Setup, weights=None, interface=None) -> Path:
             left.rmdir() if left.is_dir() else left.unlink()
         run.rmdir()
     weights = weights or random_weights(clip=setup.env.action_clip)
-    obs = np.random.default_rng(5).normal(size=(4, 392)).astype(np.float32)
+    size = (4, len(weights.mean))
+    obs = np.random.default_rng(5).normal(size=size).astype(np.float32)
     provenance = Provenance(config_digest(path), Normalizer(1000, 1000), None, {})
     interface = interface or interface_of(make_env(setup, 1, "cpu"))
     action = forward(weights, obs)
     parity = (obs, action)
-    bundle = encode_bundle(weights, "crawl", interface, provenance, parity)
+    bundle = encode_bundle(weights, setup.train.task, interface, provenance, parity)
     write_bundle(path, bundle)
     return path
 

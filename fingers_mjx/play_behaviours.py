@@ -1,0 +1,135 @@
+"""The shim's behaviours in the closed loop: recovery, detector, ramp, next policy.
+
+`fingers_deploy.behaviour.Policies` decides which policy runs and when a ramp moves the
+targets, told by packets as the supervisor sends them; here it has the calls of a
+`PolicyController`.
+"""
+
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from envs.errors import InputError
+from fingers_deploy import Bundle, PolicyController
+from fingers_deploy.behaviour.command import DEADZONE, FixedCommand, Ranges
+from fingers_deploy.behaviour.policies import Policies
+from fingers_deploy.policy import Runtime
+from fingers_deploy.runtime.link import OBSERVATION, Answer, decode_answer
+from fingers_deploy.safety import PolicyFault
+from fingers_mjx.play_upright import orientation_of
+
+
+class Behaviours:
+    """A recovery policy, and the policy to which it leads, under the shim's rules.
+
+    Args:
+        recovery: policy that the operator has selected.
+        then: policy that takes over in the stance; None holds the stance instead.
+        command: of that policy, held all the time; its fastest forward motion if None.
+        runtime: what runs the policies.
+
+    Raises:
+        InputError: a command outside the training range of `then`.
+    """
+
+    def __init__(
+        self,
+        recovery: Bundle,
+        then: Bundle | None = None,
+        command: tuple[float, ...] | None = None,
+        runtime: Runtime = "auto",
+    ):
+        bundles = (recovery,) if then is None else (then, recovery)
+        self._controllers = tuple(PolicyController(b, runtime) for b in bundles)
+        self._selected = len(bundles) - 1
+        interface = recovery.manifest.interface
+        self._dt_s = 1.0 / interface.control_rate_hz
+        sticks = (1.0,)
+        if command is not None:
+            sticks = sticks_for(command, bundles[0].manifest.interface.command_ranges)
+        self._source = FixedCommand(sticks)
+        self.reset(interface.initial_target_rad)
+
+    def reset(self, target_rad: Float[np.ndarray, "20"] | tuple[float, ...]) -> None:
+        """Starts an episode with the joint targets `target_rad` [rad] on the wire."""
+        self._policies = Policies(self._controllers, self._source)
+        self.target_rad = np.asarray(target_rad, float)
+        self.tick = -1
+        self._ask(np.zeros(20), np.array([0.0, 0.0, -1.0]), np.zeros(3), False)
+
+    def step(
+        self,
+        joint_pos: Float[np.ndarray, "20"],
+        gravity_b: Float[np.ndarray, "3"],
+        angvel_b: Float[np.ndarray, "3"],
+        command: Float[np.ndarray, " n"],
+    ) -> Float[np.ndarray, "20"]:
+        """Returns the joint targets [rad] of this control step.
+
+        Args:
+            joint_pos: joint angles [rad].
+            gravity_b: unit vector of gravity in the palm frame.
+            angvel_b: angular velocity of the palm [rad/s].
+            command: of the environment; not used, the operator's counts.
+        """
+        del command
+        answer = self._ask(joint_pos, gravity_b, angvel_b, True)
+        self.target_rad = np.array(answer.proposal.target_rad)
+        known = answer.command[np.isfinite(answer.command)]
+        self.command = np.zeros(3, np.float32)
+        self.command[: len(known)] = known
+        self.faults = int(answer.proposal.fault != PolicyFault.NONE)
+        return self.target_rad.astype(np.float32)
+
+    @property
+    def action(self) -> Float[np.ndarray, "20"]:
+        """Last clipped output of the policy that runs."""
+        return self._controllers[self._policies.active].action
+
+    @property
+    def settling(self) -> bool:
+        """Whether the detector has fired and a ramp has the targets."""
+        return self._policies.settling
+
+    @property
+    def handed_over(self) -> bool:
+        """Whether the policy to which recovery leads runs now."""
+        return self._policies.active != self._selected
+
+    def _ask(
+        self,
+        joint_pos: Float[np.ndarray, "20"],
+        gravity_b: Float[np.ndarray, "3"],
+        angvel_b: Float[np.ndarray, "3"],
+        runs: bool,
+    ) -> Answer:
+        self.tick += runs
+        packet: Any = np.zeros((), OBSERVATION)
+        packet["tick"], packet["t_s"] = self.tick, max(self.tick, 0) * self._dt_s
+        packet["pos"], packet["gyro"] = joint_pos, angvel_b
+        packet["quat"] = orientation_of(gravity_b)
+        packet["target"] = self.target_rad
+        packet["runs"], packet["policy"] = runs, self._selected
+        return decode_answer(self._policies.answer(packet[()]))
+
+
+def sticks_for(command: tuple[float, ...], ranges: Ranges) -> tuple[float, ...]:
+    """Stick positions that ask for a command; the inverse of `stick_command`.
+
+    Args:
+        command: one value for each entry of `ranges`.
+        ranges: lowest and highest value of each entry in training.
+
+    Raises:
+        InputError: a value outside its range.
+    """
+    sticks = []
+    for index, (value, (low, high)) in enumerate(zip(command, ranges, strict=True)):
+        if not low <= value <= high:
+            raise InputError("--command", f"[{index}]", value, f"{low:g} to {high:g}")
+        end = high if value > 0 else -low
+        share = abs(value) / end if value else 0.0
+        out = DEADZONE + (1.0 - DEADZONE) * share if value else 0.0
+        sticks.append(float(np.copysign(out, value)))
+    return tuple(sticks)
