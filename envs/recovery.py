@@ -21,6 +21,7 @@ from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.recovery_falls import SIDES, Falls, falls_of
 from envs.recovery_measures import recovery_measures
+from envs.recovery_practice import Poses, practice_of
 from envs.recovery_settle import (
     Settle,
     Settling,
@@ -52,10 +53,14 @@ class RecoveryConfig(HandSettings):
         settle: whether, as on the hand, the joint targets are taken to the stance once
             the upright detector has fired. Evaluations do so; in training the policy
             goes on, so that it learns to stay up (paper).
+        practice_fraction: share of training episodes that start from a practice pose
+            (`envs.recovery_practice`) instead of a fall (ours). With `settle` there are
+            none.
     """
 
     command: CommandConfig = field(default_factory=_no_command)
     settle: bool = False
+    practice_fraction: float = field(default=0.0, metadata={"low": 0.0, "high": 1.0})
     # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
     # 14 contacts under random actions, and Warp's pool also holds the near pairs.
     contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
@@ -86,6 +91,7 @@ class Recovery(BareTask):
         config: settings of the task.
         stance: the crawl stance that is to be reached.
         falls: poses that episodes start from.
+        practice: poses that some training episodes start from instead.
         table: rows of the reward; they may bind every signal and the magnitudes of
             `magnitudes`.
     """
@@ -93,6 +99,7 @@ class Recovery(BareTask):
     config: RecoveryConfig
     stance: Stance
     falls: Falls
+    practice: Poses = ()
     table: RewardTable = RECOVERY
 
     def begin_world(self) -> dict[str, Any]:
@@ -119,11 +126,10 @@ class Recovery(BareTask):
         The joint targets are the joint angles: the motors were off and are energized
         where the joints are (paper), so that nothing pushes at first.
         """
-        fall = self._drawn(key)
         turn = jax.random.uniform(
             stream(key, "heading"), (), minval=-jnp.pi, maxval=jnp.pi
         )
-        pose = jnp.array(self.falls.qpos)[fall]
+        pose = self._pose(key)
         quat_w = multiply(about_z(turn), pose[3:7])
         qpos = jnp.concatenate([pose[:3], quat_w, pose[7:]])
         rest = jnp.zeros(plant.mj_model.nv)
@@ -206,6 +212,17 @@ class Recovery(BareTask):
             self.config.action_scale_rad,
         )
 
+    def _pose(self, key: Array) -> Float[Array, "27"]:
+        """Generalized position of the fall or practice pose of an episode."""
+        fall = jnp.array(self.falls.qpos)[self._drawn(key)]
+        if not self.practice:
+            return fall
+        which, pick = jax.random.split(stream(key, "practice"))
+        poses = jnp.array(self.practice)
+        practice = poses[jax.random.randint(pick, (), 0, len(poses))]
+        chosen = jax.random.uniform(which) < self.config.practice_fraction
+        return jnp.where(chosen, practice, fall)
+
     def _drawn(self, key: Array) -> Int[Array, ""]:
         """Number of the pose that an episode starts from."""
         return jax.random.randint(stream(key, "fall"), (), 0, len(self.falls.side))
@@ -232,7 +249,10 @@ class RecoveryEnv(HandEnv):
     ):
         hand = hand or load_hand_file()
         stance = stance or stance_of(hand)
-        task = Recovery(config or RecoveryConfig(), stance, falls_of(hand, stance))
+        config, falls = config or RecoveryConfig(), falls_of(hand, stance)
+        wanted = config.practice_fraction > 0.0 and not config.settle
+        practice = practice_of(hand, stance) if wanted else ()
+        task = Recovery(config, stance, falls, practice)
         super().__init__(task, backend, num_worlds, hand, stance)
 
     def step(self, state: State, action: Float[Array, "20"]) -> State:

@@ -129,10 +129,10 @@ def _poses(model: mujoco.MjModel, stance: Stance, side: str) -> list[tuple]:
     poses: list[tuple] = []
     for _ in range(_TRIES):
         target = _draw_curl(rng, model)
-        joints = _curl(model, stance, target)
-        data = _lie_down(model, joints, target, _draw_lean(rng, side))
+        joints = curl(model, stance, target)
+        data = lie_down(model, joints, target, _draw_lean(rng, side))
         if _rests_on(side, data):
-            poses.append((_floats(data.qpos), _floats(target)))
+            poses.append((rounded(data.qpos), rounded(target)))
         if len(poses) == POSES_PER_SIDE:
             return poses
     found = f"{len(poses)} of {_TRIES} falls"
@@ -152,7 +152,7 @@ def _draw_lean(rng: np.random.Generator, side: str) -> np.ndarray:
     return quat / np.linalg.norm(quat)
 
 
-def _curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarray:
+def curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarray:
     """Joint angles after the fingers have curled from the stance, without weight."""
     data = mujoco.MjData(model)
     data.qpos[:] = stance.qpos
@@ -167,15 +167,19 @@ def _curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarr
     return data.qpos[7:].copy()
 
 
-def _lie_down(
-    model: mujoco.MjModel, joints: np.ndarray, target: np.ndarray, quat: np.ndarray
+def lie_down(
+    model: mujoco.MjModel,
+    joints: np.ndarray,
+    target: np.ndarray,
+    quat: np.ndarray,
+    duration_s: float = SETTLE_S,
 ) -> mujoco.MjData:
-    """Puts the hand down just above the floor and lets it settle."""
+    """Puts the hand down just above the floor and lets it sink or settle."""
     data = mujoco.MjData(model)
     data.qpos[:] = [0.0, 0.0, 1.0, *quat, *joints]
     data.qpos[2] -= clearance_m(model, data.qpos) - _GAP_M
     data.ctrl[:] = target
-    for _ in range(round(SETTLE_S / PHYSICS_DT_S)):
+    for _ in range(round(duration_s / PHYSICS_DT_S)):
         mujoco.mj_step(model, data)
     data.qpos[:2] = 0.0
     return data
@@ -188,5 +192,6 @@ def _rests_on(side: str, data: mujoco.MjData) -> bool:
     return bool(still and lowest == side and down @ SIDES[side] > _LEAST_DOWN[side])
 
 
-def _floats(values: np.ndarray) -> tuple[float, ...]:
+def rounded(values: np.ndarray) -> tuple[float, ...]:
+    """Numbers as they are stored."""
     return tuple(round(float(value), 9) for value in values)

@@ -57,10 +57,11 @@ def stance_pose(
     gravity_v: Float[Array, "3"],
     width_rad: Scalar = POSE_WIDTH_RAD,
 ) -> Float[Array, ""]:
-    """Closeness to the stance's joints of an upright hand, c² exp(−mean (q − q*)²/w²).
+    """Closeness to the stance's joints of an upright hand, c⁸ exp(−mean (q − q*)²/w²).
 
     c = max(0, −g_z) = max(0, cos θ) is 1 when level. Without it, a hand that takes the
-    pose while it lies on its side would be paid for staying there.
+    pose while it lies on its side would be paid for staying there; with c² a palm that
+    lies flat, 36° from its stance, still is (0.65 against 0.18), and stays.
 
     Args:
         joint_pos: joint angles q [rad].
@@ -77,4 +78,4 @@ def stance_pose(
     """
     joints = joint_pos.shape[-1]
     near = tracking_kernel((joint_pos - stance_joint_pos) / jnp.sqrt(joints), width_rad)
-    return jnp.square(jnp.maximum(0.0, -gravity_v[2])) * near
+    return jnp.maximum(0.0, -gravity_v[2]) ** 8 * near
