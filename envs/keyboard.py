@@ -26,6 +26,7 @@ from envs.keyboard_model import (
     KEY_NAMES,
     TOP_M,
     add_keyboard,
+    free_fingertip,
     key_events,
 )
 from envs.keyboard_requests import (
@@ -131,6 +132,7 @@ class Keyboard:
     def add_scene(self, spec: mujoco.MjSpec) -> None:
         """The keyboard."""
         add_keyboard(spec, PLACEMENT, TIP_LINKS[FINGER_INDEX])
+        free_fingertip(spec, TIP_LINKS[FINGER_INDEX])
 
     def vary_scene(
         self, plant: Plant, fields: ModelFields, lasting: Lasting
@@ -237,7 +239,11 @@ class Keyboard:
     def privileged(
         self, carried: Mapping[str, Any], signals: Signals
     ) -> Float[Array, " n"]:
-        """Where the keys are, how they move and resist, how long the request waits."""
+        """Where the keys are, how they resist, how long the request waits.
+
+        Their depth is not in it: most keys never move at first, and the normalizer
+        would make their first press a huge number. Where the tip stands tells it.
+        """
         memory: KeyboardMemory = carried["task"]
         draw = self._draw(carried["lasting"])
         v_quat_w = multiply(signals.palm_quat_w, jnp.array(self.stance.q_off))
@@ -246,8 +252,8 @@ class Keyboard:
         )
         waiting_s = memory.requests.steps * self.config.control_dt_s
         drift = signals.extra["support_pos_w"] - memory.support_start_w
-        parts = (offsets, drift, signals.extra["key_depth_m"], draw.actuation_m)
-        flat = [x.reshape(-1) for x in (*parts, draw.force_n)]
+        parts = (offsets, drift, draw.actuation_m, draw.force_n)
+        flat = [x.reshape(-1) for x in parts]
         return jnp.concatenate([*flat, waiting_s[None]])
 
     def magnitudes(

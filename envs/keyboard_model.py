@@ -33,7 +33,7 @@ KEYBOARD = "keyboard"
 _CASE_HEIGHT_M, _BEZEL_M = 0.018, 0.006
 _CAP_M, _CAP_HEIGHT_M, _CAP_FRICTION = 0.0135, 0.008, 0.4
 _MASS_KG, _ARMATURE_KG, _DAMPING = 0.002, 0.008, 1.0
-_HAND_BIT = 2  # what the hand's links collide with, see `envs.hand.model`
+_FLOOR_BIT, _HAND_BIT = 1, 2  # contact groups of `envs.hand.model`
 _RIGID = {"solref": [0.01, 1.0], "solimp": [0.98, 0.99, 0.001, 0.5, 2.0]}
 
 
@@ -117,6 +117,20 @@ def add_keyboard(spec: mujoco.MjSpec, placement: Placement, finger_geom: str) ->
     for body in (PALM, PAYLOAD):
         for name in (KEYBOARD, *(f"key_{key.name}" for key in LAYOUT)):
             spec.add_exclude(bodyname1=body, bodyname2=name)
+
+
+def free_fingertip(spec: mujoco.MjSpec, finger_geom: str) -> None:
+    """Lets the pressing fingertip meet the floor with its capsule, not its sphere.
+
+    Its contact force with the floor then always reads zero: it is no support, and a
+    critic's input that is zero until a rare touch would be huge after normalization.
+
+    Args:
+        spec: scene with the hand.
+        finger_geom: capsule of the pressing fingertip.
+    """
+    spec.geom(f"{finger_geom}_tip").conaffinity = 0
+    spec.geom(finger_geom).conaffinity |= _FLOOR_BIT
 
 
 def key_events(

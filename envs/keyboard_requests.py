@@ -74,9 +74,17 @@ class Outcome:
 
 
 def begin_requests(key: Array, config: RequestConfig, dt_s: float) -> Requests:
-    """An episode begins with a gap."""
-    zero = jnp.zeros((), jnp.int32)
-    return Requests(jnp.array(IDLE, jnp.int32), zero, _gap_steps(key, config, dt_s))
+    """An episode begins with a gap or, as often, with a request.
+
+    Were there only gaps at first, the first iteration of a training would see inputs
+    that hardly ever change, and its normalizer would blow up those of the next.
+    """
+    asks = jax.random.bernoulli(stream(key, "asks"))
+    return Requests(
+        key=jnp.where(asks, _draw_key(key), IDLE).astype(jnp.int32),
+        steps=jnp.zeros((), jnp.int32),
+        gap_steps=_gap_steps(key, config, dt_s),
+    )
 
 
 def one_hot(requests: Requests) -> Float[Array, "4"]:
@@ -134,9 +142,8 @@ def next_request(
     """
     idle = requests.key == IDLE
     begins = idle & (requests.steps + 1 >= requests.gap_steps)
-    drawn = jax.random.randint(stream(key, "request"), (), 0, len(ARROWS))
     changed = begins | ended
-    chosen = jnp.where(begins, drawn, jnp.where(ended, IDLE, requests.key))
+    chosen = jnp.where(begins, _draw_key(key), jnp.where(ended, IDLE, requests.key))
     gap_steps = _gap_steps(key, config, dt_s)
     return Requests(
         key=chosen.astype(jnp.int32),
@@ -154,6 +161,10 @@ def check_requests(config: RequestConfig, dt_s: float) -> None:
     if config.idle_s[0] < dt_s:
         found, valid = config.idle_s[0], f">= {dt_s:g} s, a control step"
         raise InputError("configuration", "requests.idle_s", found, valid)
+
+
+def _draw_key(key: Array) -> Int[Array, ""]:
+    return jax.random.randint(stream(key, "request"), (), 0, len(ARROWS))
 
 
 def _gap_steps(key: Array, config: RequestConfig, dt_s: float) -> Int[Array, ""]:

@@ -21,6 +21,7 @@ from envs.keyboard_model import (
     KEY_NAMES,
     TOP_M,
     add_keyboard,
+    free_fingertip,
 )
 from envs.keyboard_stance import FINGER, FINGER_INDEX, PLACEMENT, keyboard_stance
 from envs.scene import build_scene
@@ -73,6 +74,7 @@ class Rig:
 
     def add(self, spec):
         add_keyboard(spec, PLACEMENT, TIP_LINKS[FINGER_INDEX])
+        free_fingertip(spec, TIP_LINKS[FINGER_INDEX])
 
     def press_points(self):
         """Where the tip's centre goes to press each arrow key of the nominal place."""

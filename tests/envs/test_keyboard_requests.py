@@ -62,10 +62,17 @@ def test_the_first_event_decides(keys, steps, expected, latency_s):
 
 
 def test_keys_in_a_gap_decide_nothing():
-    requests = begin_requests(jax.random.key(0), CONFIG, DT_S)
-    assert requests.key == IDLE and not one_hot(requests).any()
+    requests = dataclasses.replace(asking("up"), key=jnp.array(IDLE))
+    assert not one_hot(requests).any()
     outcome = judge(requests, pressed("left", "enter"), CONFIG, DT_S)
     assert told(outcome) == NOTHING | {"stray": 2.0}
+
+
+def test_half_of_the_episodes_begin_with_a_request():
+    keys = jax.random.split(jax.random.key(5), 400)
+    first = jax.vmap(lambda key: begin_requests(key, CONFIG, DT_S).key)(keys)
+    counts = np.bincount(np.asarray(first) - IDLE, minlength=5)
+    assert 160 < counts[0] < 240 and counts[1:].min() > 25
 
 
 @pytest.fixture(scope="module")
