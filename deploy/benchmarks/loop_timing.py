@@ -111,8 +111,6 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     status, timing = launcher.status, launcher.status["timing"]
     missed = timing["late_over_5ms"] + timing["skipped"]
     asked = timing["control_steps"] + timing["skipped"]
-    # The last one is the operator's.
-    stops = sum(line.startswith("active -> ") for line in lines) - 1
     return {
         "minutes": round(took / 60, 1),
         "busy_cores": round((after[0] - before[0]) / took, 2),
@@ -134,7 +132,7 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         "largest_file_mb": round(largest / 1e6, 1),
         "steps_with_policy": sum(row["walked"] for row in recorded),
         "worst_skipped_in_a_row": max(row["in_a_row"] for row in recorded),
-        "stops": max(stops, 0),
+        "stops": sum(row["stops"] for row in recorded),
         "stops_after_a_pause": sum(row["stops_in_a_pause"] for row in recorded),
         "why": sorted({line.split(":")[0] for line in lines if " -> hold" in line}),
         "warned": any(line.startswith("NOT ON TIME") for line in lines),
@@ -142,7 +140,7 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
 
 
 def _recorded(file: Path, pauses: Pauses) -> dict[str, int]:
-    """Counts of one file: steps with the policy, missed in a row, in a pause, stops."""
+    """Counts of one file: steps, misses and the supervisor's stops, also in pauses."""
     log = read_log(file)
     rows, start = log.rows, float(log.metadata["start_unix_s"])
     walked = int((rows["mode"] == Mode.ACTIVE).sum())
@@ -156,11 +154,17 @@ def _recorded(file: Path, pauses: Pauses) -> dict[str, int]:
         if pauses.during(begin, t):
             excused += int(late[k]) + int(skipped[k])
     worst = int(skipped.max()) if len(skipped) else 0
-    stops = [start + t for t, line in log.events if line.startswith("active -> ")]
+    asked = {t for t, line in log.events if line.startswith("OP ")}
+    stops = [
+        start + t
+        for t, line in log.events
+        if line.startswith("active -> ") and t not in asked
+    ]
     return {
         "walked": walked,
         "in_a_row": worst,
         "in_a_pause": excused,
+        "stops": len(stops),
         "stops_in_a_pause": sum(pauses.during(t - REACTION_S, t) for t in stops),
     }
 
