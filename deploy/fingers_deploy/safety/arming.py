@@ -1,4 +1,4 @@
-"""Arming: energize at the measured pose, wiggle, ramp to the rest pose."""
+"""Arming: energize at the measured pose, wiggle, ramp to where the policy begins."""
 
 import enum
 from dataclasses import dataclass, replace
@@ -114,7 +114,7 @@ def _wiggle(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progres
 
 
 def _ramp(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progress:
-    start, goal = arming.start_rad, limits.rest_rad
+    start, goal = arming.start_rad, _begin_rad(arming, limits)
     duration = ramp_duration(start, goal, limits.settle_s, RAMP_SPEED_RAD_S)
     elapsed = t - arming.since_s
     target = smooth_ramp(start, goal, elapsed, duration)
@@ -125,7 +125,12 @@ def _ramp(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progress:
 
 def _rest(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progress:
     done = t - arming.since_s >= REST_S
-    return Progress(arming, limits.rest_rad, done, {})
+    return Progress(arming, _begin_rad(arming, limits), done, {})
+
+
+def _begin_rad(arming: Arming, limits: Limits) -> Array:
+    """Targets with which the policy begins."""
+    return arming.start_rad if limits.begins_at_pose else limits.rest_rad
 
 
 _STEPS = {

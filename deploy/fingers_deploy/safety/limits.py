@@ -35,6 +35,8 @@ class Limits:
         target_margin_rad: a proposed target so far outside the trained limits is a
             fault, less is clamped.
         rest_rad: targets at which the settle ramp ends and the policy begins, [20].
+        begins_at_pose: the policy begins at the measured pose instead, as a recovery
+            does wherever the hand has fallen.
         v_quat_b: orientation of V in the palm frame, w x y z.
         step_rad: largest change of a target per control step.
         control_dt_s: control interval [s].
@@ -73,6 +75,7 @@ class Limits:
     max_roll_rad: float
     max_pitch_rad: float
     tilt_s: float
+    begins_at_pose: bool = False
     obs_age_s: float = 0.040
     frozen_joints_s: float = 0.100
     frozen_target_rad: float = 0.02
@@ -133,6 +136,7 @@ def make_limits(manifest: Manifest, factory_rad: Array, **changes: Any) -> Limit
         max_roll_rad=float(np.deg2rad(roll)),
         max_pitch_rad=float(np.deg2rad(pitch)),
         tilt_s=tilt_s,
+        begins_at_pose=manifest.task == "recovery",
     )
     return dataclasses.replace(limits, **changes)
 

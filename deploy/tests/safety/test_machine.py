@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from fingers_deploy.safety import Mode, Operator, PolicyFault, Reaction, step
 from fingers_deploy.safety.latch import severest
+from fingers_deploy.safety.limits import make_limits
 from fingers_deploy.safety.machine import CONFIRM_TRIES, TRANSITIONS, Event
 
 DT = 0.002
@@ -251,6 +252,19 @@ def test_the_first_target_is_the_measured_pose(make_rig):
         before = rig.out.target_rad
         rig.tick()
         assert np.abs(rig.out.target_rad - before).max() <= 0.02
+
+
+@pytest.mark.parametrize("task", ["crawl", "recovery"])
+def test_a_recovery_begins_where_the_hand_lies(bundle, limits, make_rig, task):
+    made = make_limits(replace(bundle.manifest, task=task), limits.factory_rad)
+    rig = make_rig(begins_at_pose=made.begins_at_pose)
+    pose = rig.pos.copy()  # 0.1 rad from the rest pose
+    rig.run(0.1)
+    rig.tick(Operator.ARM)
+    rig.run(60, until=Mode.ACTIVE)
+    begins = pose if task == "recovery" else limits.rest_rad
+    assert np.abs(pose - limits.rest_rad).max() > 0.09
+    np.testing.assert_allclose(rig.out.target_rad, begins, atol=0.01)
 
 
 def test_hold_goes_to_the_measured_pose_without_a_jump(rig):
