@@ -1,7 +1,5 @@
 """The fault matrix, small; `make test-slow` runs the large one."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from fault_lab import Lab, snapshots
@@ -10,8 +8,8 @@ from fault_processes import SIGNALS, WITHIN_S, kill_one
 from fault_scenarios import SCENARIOS
 from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
+from hand_files import WALKING
 
-import fingers_mjx
 from fingers_deploy import load_bundle
 from fingers_deploy.safety import ROWS, Mode
 
@@ -101,11 +99,27 @@ def test_no_false_stop(starts):
 
 
 def test_the_trained_policy_walks_under_the_supervisor(hand_model):
-    policy = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
-    bundle = load_bundle(policy)
+    bundle = load_bundle(WALKING)
     lab = Lab(hand_model, (bundle,), sticks=(1.0, 0.0, 0.0), loop_hz=250).activate()
     begin = lab.driver.hand.data.qpos[:2].copy()
     lab.run(8.0)
+    assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
+    assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
+
+
+def test_switching_policies_while_walking(hand_model):
+    """Back and forth every half second: no stop, no jump, and the hand still walks."""
+    both, sticks = (load_bundle(WALKING),) * 2, (1.0, 0.0, 0.0)
+    lab = Lab(hand_model, both, sticks=sticks, loop_hz=250).activate()
+    lab.run(2.0).forget()
+    for k in range(8):
+        lab.core.selected = 1 - k % 2
+        lab.run(0.5)
+        assert lab.link.policies.active == 1 - k % 2
+    targets = np.array([target for _, target in lab.driver.written])
+    assert np.abs(np.diff(targets, axis=0)).max() <= lab.core.limits.step_rad + 1e-6
+    begin = lab.driver.hand.data.qpos[:2].copy()
+    lab.run(4.0)
     assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
     assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
 
