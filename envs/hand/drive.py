@@ -1,10 +1,11 @@
-"""The actuator chain of one hand, used by training and by identification.
+"""The actuator chain of a hand without effects of joints.
 
 Every physics substep: target → transport delay → firmware low-pass → speed limit →
 position servo with torque limit. The stages are in series, each with a state of its
 own: the firmware filter does not know that the motor saturates behind it. The speed
 limit comes after the filter because the paper measures the speed of the *filtered*
-response (2.8 and 2.5 rad/s ramps), which bounds what the servo follows.
+response (2.8 and 2.5 rad/s ramps), which bounds what the servo follows. The formulas
+are those of the effects of these names; `envs.hand.chained_drive` runs all effects.
 """
 
 import math
@@ -15,6 +16,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from envs.errors import InputError
+from envs.hand.effects.lowpass_cutoff import filtered
+from envs.hand.effects.slew_limit import limited
+from envs.hand.effects.transport_delay import read_delayed
 from envs.hand.hand_file import HandFile
 
 MAX_DELAY_S = 0.04
@@ -110,14 +114,10 @@ def command_step(
 ) -> tuple[DriveState, Float[Array, "20"]]:
     """Advances the command path by one substep.
 
-    delay:     x_k = u(t_k − T), linear between the samples of the delay line
-    low-pass:  y_k = y_{k−1} + (1 − e^{−2π f_c Δt}) (x_k − y_{k−1})
-    speed:     c_k = clip(y_k, c_{k−1} ± v_max Δt)
+    The formulas are those of the effects `transport_delay`, `lowpass_cutoff` and
+    `slew_limit`:
 
-    The low-pass is the exact discretization of 1/(1 + s/2πf_c) for a target held over
-    the substep, so its time constant 1/(2πf_c) does not depend on Δt. The backward
-    Euler factor Δt/(Δt + 1/2πf_c) of the vendor's host-side fallback does (4 % slower
-    at 3 Hz and 200 Hz), while the firmware it stands for runs much faster.
+        x_k = u(t_k − T),   ẏ = 2π f_c (x − y),   |ċ| ≤ v_max
 
     Args:
         params: parameters of the drive.
@@ -129,22 +129,10 @@ def command_step(
         The new state and the command c_k that the servo follows [rad].
     """
     targets = jnp.concatenate([target[None], state.targets[:-1]])
-    delayed = _delayed(targets, params.delay_s / dt)
-    alpha = -jnp.expm1(-2.0 * jnp.pi * params.lowpass_hz * dt)
-    filtered = state.filtered + alpha * (delayed - state.filtered)
-    reach = params.speed_limit * dt
-    command = jnp.clip(filtered, state.command - reach, state.command + reach)
-    return DriveState(targets=targets, filtered=filtered, command=command), command
-
-
-def _delayed(
-    targets: Float[Array, "slots 20"], delay_steps: Float[Array, ""]
-) -> Float[Array, "20"]:
-    """Reads the delay line at a fractional age, by hat functions around each sample."""
-    ages = jnp.arange(targets.shape[0])
-    age = jnp.clip(delay_steps, 0.0, targets.shape[0] - 1.0)
-    weights = jnp.maximum(0.0, 1.0 - jnp.abs(ages - age))
-    return jnp.sum(weights[:, None] * targets, axis=0)
+    delayed = read_delayed(targets, params.delay_s, dt)
+    smooth = filtered(state.filtered, delayed, params.lowpass_hz, dt)
+    command = limited(state.command, smooth, params.speed_limit, dt)
+    return DriveState(targets=targets, filtered=smooth, command=command), command
 
 
 def servo_torque(

@@ -20,5 +20,6 @@ EFFECT = EffectKind(
         "transport_delay": "chirp: inertia bends the gain",
         "compliance": "chirp past the resonance: a spring turns the phase once more",
     },
-    source="R. Featherstone, Rigid Body Dynamics Algorithms, Springer 2008",
+    source="MuJoCo XML reference, joint armature (rotor inertia times the square of "
+    "the gear ratio)",
 )

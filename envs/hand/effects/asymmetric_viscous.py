@@ -24,6 +24,6 @@ EFFECT = EffectKind(
         "asymmetric_friction": "ramps in both directions at several speeds",
         "viscous_friction": "ramps in both directions at several speeds",
     },
-    source="B. Armstrong-Hélouvry et al., A Survey of Models, Analysis Tools and "
-    "Compensation Methods for the Control of Machines with Friction, Automatica 1994",
+    source="ours; in the data of A. Janot et al., Data Set and Reference Models of "
+    "EMPS, 2019, it explains what the reference model puts into an offset",
 )

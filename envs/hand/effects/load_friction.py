@@ -22,7 +22,7 @@ EFFECT = EffectKind(
         "stiffness": "loaded motion both ways: friction opens a loop",
         "torque_limit": "effort: a limit is flat",
     },
-    source="G. Duclusaud et al., Extended Friction Models for the Physics Simulation "
+    source="M. Duclusaud et al., Extended Friction Models for the Physics Simulation "
     "of Servo Actuators, arXiv 2410.08650 (models M3 and M5)",
     uses_load=True,
 )

@@ -1,15 +1,31 @@
 """First-order low-pass of the target in the firmware."""
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from envs.hand.effects.base import EffectKind, Parameter, Params, Stage, lognormal
 
 
-def _act(params: Params, filtered, x, dt):
-    """Exact for a command that is held over the substep."""
-    alpha = -jnp.expm1(-2.0 * jnp.pi * params["cutoff_hz"] * dt)
-    filtered = filtered + alpha * (x.command - filtered)
-    return filtered, x.replace(command=filtered)
+def filtered(
+    last: Float[Array, "*j"],
+    command: Float[Array, "*j"],
+    cutoff_hz: Float[Array, "*j"],
+    dt: float,
+) -> Float[Array, "*j"]:
+    """Advances the low-pass, exactly for a command that is held over the substep.
+
+    y' = y + (1 − e^{−2π f_c Δt}) (u − y). Its time constant 1/(2πf_c) does not depend
+    on Δt. The backward Euler factor Δt/(Δt + 1/2πf_c) of the vendor's host-side
+    fallback does (4 % slower at 3 Hz and 200 Hz), while the firmware that it stands for
+    runs much faster.
+    """
+    alpha = -jnp.expm1(-2.0 * jnp.pi * cutoff_hz * dt)
+    return last + alpha * (command - last)
+
+
+def _act(params: Params, last, x, dt):
+    command = filtered(last, x.command, params["cutoff_hz"], dt)
+    return command, x.replace(command=command)
 
 
 EFFECT = EffectKind(

@@ -1,13 +1,24 @@
 """Largest speed of the command."""
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from envs.hand.effects.base import EffectKind, Parameter, Params, Stage, lognormal
 
 
+def limited(
+    last: Float[Array, "*j"],
+    command: Float[Array, "*j"],
+    speed_rad_s: Float[Array, "*j"],
+    dt: float,
+) -> Float[Array, "*j"]:
+    """Moves towards the command by at most v_max Δt."""
+    reach = speed_rad_s * dt
+    return jnp.clip(command, last - reach, last + reach)
+
+
 def _act(params: Params, last, x, dt):
-    reach = params["speed_rad_s"] * dt
-    command = jnp.clip(x.command, last - reach, last + reach)
+    command = limited(last, x.command, params["speed_rad_s"], dt)
     return command, x.replace(command=command)
 
 

@@ -32,5 +32,5 @@ EFFECT = EffectKind(
         "stiffness": "one joint alone against all together",
     },
     source="ours, from the circuit of a source with an inner resistance; dependence of "
-    "a servo's torque on its voltage: G. Duclusaud et al., arXiv 2410.08650",
+    "a servo's torque on its voltage: M. Duclusaud et al., arXiv 2410.08650",
 )
