@@ -184,6 +184,22 @@ def _play(commands) -> None:
         "--command (default: its fastest forward)",
     )
     parser.add_argument(
+        "--keys",
+        metavar="KEY,KEY",
+        help="keyboard: what to press, out of left, down, right, up",
+    )
+    parser.add_argument(
+        "--level",
+        choices=("one-box", "two-boxes"),
+        help="keyboard: a Sokoban level, its shortest solution pressed key by key",
+    )
+    parser.add_argument(
+        "--retries",
+        type=whole(0, 10),
+        default=0,
+        help="keyboard: ask again after a time-out (default 0)",
+    )
+    parser.add_argument(
         "--video", type=Path, metavar="FILE", help=".mp4, .webp or .gif to write"
     )
     parser.add_argument(

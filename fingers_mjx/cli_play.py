@@ -8,12 +8,16 @@ from typing import Any
 from envs.errors import InputError, one_of
 from fingers_deploy import Bundle
 from fingers_mjx.cli_paths import check_file
+from fingers_mjx.cli_play_keys import key_times, keys_asked, start_board
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import document, nominal, with_command
 from fingers_mjx.play import Player, Schedule
 from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
+from fingers_mjx.play_keyboard import TASK as KEYBOARD
+from fingers_mjx.play_keyboard import KeyPlayer, keys_story
+from fingers_mjx.play_keyboard_video import write_keyboard_video
 from fingers_mjx.play_recovery import (
     RecoveryPlayer,
     check_chain,
@@ -48,16 +52,21 @@ def run(args: argparse.Namespace) -> int:
         args.json.parent.mkdir(parents=True, exist_ok=True)
         write_summary(args.json, summary)
     if args.video:
-        _film(args, player, played)
+        _film(args, bundle, player, played)
     print_measures(summary)
     if isinstance(player, RecoveryPlayer):
         print("first episode:", story(played.first, player.env.dt, _then_name(args)))
+    if isinstance(player, KeyPlayer):
+        print("keys:", keys_story(player.results, start_board(args)))
     return 0
 
 
 def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
     """Returns what plays the bundle; recoveries end as the shim ends them."""
+    keys = keys_asked(args, bundle)
     env = make_env(setup, 1, "cpu")
+    if keys is not None:
+        return KeyPlayer(env, bundle, keys, key_times(args, setup.env), args.runtime)
     if args.then is None and not is_recovery(bundle):
         return Player(env, bundle, args.runtime)
     commands = args.commands or []
@@ -96,14 +105,18 @@ def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     return dataclasses.replace(setup, env=env)
 
 
-def _film(args: argparse.Namespace, player: Player, played: Session) -> None:
+def _film(
+    args: argparse.Namespace, bundle: Bundle, player: Player, played: Session
+) -> None:
     """Draws the first episode."""
     args.video.parent.mkdir(parents=True, exist_ok=True)
     model, dt_s = player.env.mj_model, player.env.dt
+    how = (args.video, model, played.first, dt_s, args.fps, args.width)
     with counting(sys.stderr, "drawing", "frames") as progress:
-        write_video(
-            args.video, model, played.first, dt_s, args.fps, args.width, progress
-        )
+        if bundle.manifest.task == KEYBOARD:
+            write_keyboard_video(*how, progress, start_board(args))
+        else:
+            write_video(*how, progress)
 
 
 def _conditions(args: argparse.Namespace, played: Session) -> dict[str, Any]:
@@ -114,6 +127,9 @@ def _conditions(args: argparse.Namespace, played: Session) -> dict[str, Any]:
         "then": _then_name(args),
         "seconds": args.seconds,
         "commands": args.commands,
+        "keys": args.keys,
+        "level": args.level,
+        "retries": args.retries,
         "randomize": args.randomize,
         "friction": args.friction,
         "steps_held": played.held,

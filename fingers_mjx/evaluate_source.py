@@ -11,6 +11,8 @@ from matplotlib.figure import Figure
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
+from envs.keyboard import KeyboardConfig
+from envs.keyboard_variation import nominal_keyboard
 from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
 from fingers_mjx import figures
@@ -34,10 +36,15 @@ GAIT_S = 8.0
 
 
 def nominal(setup: Setup) -> Setup:
-    """Returns `setup` with the nominal hand, and no noise, not at the start either."""
+    """Returns `setup` with the nominal hand, and no noise, not at the start either.
+
+    A keyboard is that of the figures, and lies where it should.
+    """
     calm = no_randomization(setup.hand.tip_friction.value)
     noise = ("reset_joint_rad", "reset_speed_mps")  # of tasks that start in the stance
-    still = {name: 0.0 for name in noise if hasattr(setup.env, name)}
+    still: dict[str, Any] = {n: 0.0 for n in noise if hasattr(setup.env, n)}
+    if isinstance(setup.env, KeyboardConfig):
+        still["keyboard"] = nominal_keyboard()
     env = dataclasses.replace(setup.env, randomize=calm, **still)
     return dataclasses.replace(setup, env=env)
 

@@ -1,0 +1,177 @@
+"""Lists of keys in the closed loop: the shim asks, the simulated keyboard answers."""
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import reduce
+from itertools import accumulate
+from typing import Any
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.base import State
+from envs.batch import BatchEnv
+from envs.keyboard_model import KEY_NAMES
+from envs.keyboard_requests import IDLE
+from envs.memory import Memory
+from envs.physics import PhysicsState
+from fingers_deploy import Bundle
+from fingers_deploy.behaviour.keys import (
+    ARROWS,
+    KeyOutcome,
+    KeyState,
+    KeyTimes,
+    begin_keys,
+    keys_step,
+)
+from fingers_deploy.fingertip import pressing_fingertip
+from fingers_deploy.policy import Runtime
+from fingers_mjx.evaluate_record import Trace
+from fingers_mjx.play import Played, Player, Schedule
+from fingers_mjx.sokoban import Board, move
+
+TASK = "keyboard"
+
+
+@dataclass(frozen=True)
+class KeysPlayed:
+    """What came of a list of keys in one episode.
+
+    Attributes:
+        outcomes: of all requests, in order.
+        pressed: every key that went down, asked for or not, in order.
+        complete: every key of the list was decided.
+    """
+
+    outcomes: tuple[KeyOutcome, ...]
+    pressed: tuple[str, ...]
+    complete: bool
+
+    def board(self, start: Board) -> Board:
+        """Returns where the keys that went down lead on a board."""
+        return reduce(move, self.pressed, start)
+
+
+class KeyPlayer(Player):
+    """Plays a list of keys through the shim.
+
+    The shim asks for one key after another and works out the fingertip from the
+    encoders; key events come from the simulated keyboard.
+
+    Args:
+        env: worlds of the keyboard task.
+        bundle: the keyboard policy.
+        keys: what to ask for, names out of `ARROWS`.
+        times: gap, time-out and retries.
+        runtime: what runs the policy.
+
+    Raises:
+        BundleError: the joints of the bundle are not those of the hand.
+        InputError: a key that cannot be asked for.
+    """
+
+    def __init__(
+        self,
+        env: BatchEnv,
+        bundle: Bundle,
+        keys: Sequence[str],
+        times: KeyTimes | None = None,
+        runtime: Runtime = "auto",
+    ):
+        super().__init__(env, bundle, runtime)
+        self.keys, self.times = tuple(keys), times or KeyTimes()
+        self.results: list[KeysPlayed] = []
+        self._state = begin_keys(self.keys, 0.0)
+        self._pressed: tuple[str, ...] = ()
+        reset, judge = self._reset, self._judge
+        self._reset: Any = lambda key: self._begun(reset(key))
+        self._judge: Any = lambda *step: self._noted(*judge(*step))
+
+    def play(self, key: Array, steps: int, schedule: Schedule | None = None) -> Played:
+        """Plays the list in one world; see `Player.play`."""
+        played = super().play(key, steps, schedule)
+        state = self._state
+        self.results.append(KeysPlayed(state.outcomes, self._pressed, state.done))
+        return played
+
+    def _begun(self, start: State) -> State:
+        """Begins the list with an episode."""
+        self._state, self._pressed = begin_keys(self.keys, 0.0), ()
+        return dataclasses.replace(start, memory=_asking(start.memory, self._state))
+
+    def _noted(self, memory: Memory, row: Trace) -> tuple[Memory, Trace]:
+        """Tells the shim what was pressed, and the environment what it asks for."""
+        pressed = pressed_in(row)
+        self._pressed += pressed
+        time_s = float(memory.steps) * self.env.dt
+        before, self._state = (
+            self._state,
+            keys_step(self._state, pressed, time_s, self.times),
+        )
+        waited = int(memory.task.requests.steps)
+        same = before.since_s == self._state.since_s
+        return _asking(memory, self._state, waited if same else 0), row
+
+    def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
+        """Asks the shim, which is told what the sensors tell."""
+        told = self._read(memory, state)
+        reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
+        joint_pos = np.asarray(told.joint_pos) + reference
+        v_quat_b = self.controller.bundle.manifest.interface.v_quat_b
+        tip_v = pressing_fingertip(joint_pos, v_quat_b)
+        return self.controller.step(
+            joint_pos,
+            np.asarray(told.gravity),
+            np.asarray(told.angvel),
+            np.concatenate([self._state.request, tip_v]),
+        )
+
+
+def pressed_in(row: Trace) -> tuple[str, ...]:
+    """Returns the names of the keys that went down in a step."""
+    flags = np.asarray(row.extra["key_pressed"]) > 0
+    return tuple(np.array(KEY_NAMES)[flags].tolist())
+
+
+def boards_of(trace: Trace, start: Board) -> list[Board]:
+    """Returns the board after every step of an episode."""
+    flags = np.asarray(trace.extra["key_pressed"]) > 0
+    steps = [[KEY_NAMES[i] for i in np.flatnonzero(row)] for row in flags]
+    after = accumulate(
+        steps, lambda board, names: reduce(move, names, board), initial=start
+    )
+    return list(after)[1:]
+
+
+def keys_story(results: Sequence[KeysPlayed], start: Board | None) -> str:
+    """Returns one sentence on what came of all episodes.
+
+    Args:
+        results: of the episodes.
+        start: the board that was played, if any.
+    """
+    outcomes = [outcome for result in results for outcome in result.outcomes]
+    hits = [outcome.latency_s for outcome in outcomes if outcome.correct]
+    text = f"{len(hits)} of {len(outcomes)} keys correct"
+    if hits:
+        text += f", median latency {np.median(hits):.2f} s"
+    if start is not None:
+        solved = sum(result.board(start).solved for result in results)
+        text += f"; level solved in {solved} of {len(results)}"
+    return text
+
+
+def _asking(memory: Memory, state: KeyState, waited: int = 0) -> Memory:
+    """Enters what the shim asks for into what the environment keeps of the episode."""
+    asked = state.asking and not state.done
+    number = ARROWS.index(state.keys[0]) if asked else IDLE
+    requests = dataclasses.replace(
+        memory.task.requests,
+        key=jnp.asarray(number, jnp.int32),
+        steps=jnp.asarray(waited, jnp.int32),
+        gap_steps=jnp.asarray(np.iinfo(np.int32).max, jnp.int32),
+    )
+    task = dataclasses.replace(memory.task, requests=requests)
+    return dataclasses.replace(memory, task=task)
