@@ -30,5 +30,7 @@ def test_pose_is_a_mean_over_the_joints_and_needs_an_upright_hand():
     away = rewards.stance_pose(stance + 0.5, stance, LEVEL)
     assert away == pytest.approx(np.exp(-1), rel=1e-5)
     leaning = jnp.array([np.sin(np.pi / 3), 0.0, -0.5])
-    assert rewards.stance_pose(stance, stance, leaning) == pytest.approx(0.5**8, rel=1e-5)
+    assert rewards.stance_pose(stance, stance, leaning) == pytest.approx(
+        0.5**8, rel=1e-5
+    )
     assert rewards.stance_pose(stance, stance, UPSIDE_DOWN) == 0.0
