@@ -6,6 +6,9 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+WIDTH = 120
+"""Room for whole names and numbers; a narrower terminal breaks the lines itself."""
+
 
 def print_measures(summary: Mapping[str, Any]) -> None:
     """Prints the measures of a summary with their 95 % intervals and percentiles."""
@@ -21,7 +24,7 @@ def print_measures(summary: Mapping[str, Any]) -> None:
         table.add_row(
             name, _text(measure["mean"]), interval, *spread, str(measure["n"])
         )
-    Console(soft_wrap=True, highlight=False).print(table)
+    Console(soft_wrap=True, highlight=False, width=WIDTH).print(table)
 
 
 def _text(value: float | None) -> str:

@@ -30,6 +30,7 @@ from envs.physics.base import nominal_field
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluate_record import Trace, record
+from fingers_mjx.play_inputs import PlayInputs
 
 Schedule = Float[np.ndarray, "steps 3"]
 
@@ -65,6 +66,7 @@ class Player:
         self.env = env
         self.controller = PolicyController(bundle, runtime)
         self.controller.check_joint_order(figures().joint_names)
+        self._inputs = PlayInputs(env)
         self._reset = jax.jit(env.env.reset)
         self._read: Callable[..., Sample] = jax.jit(self._reading)
         self._drive: Callable[..., Any] = jax.jit(env.plant.commands)
@@ -86,6 +88,7 @@ class Player:
         data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
         memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
         self.controller.reset(np.asarray(start.memory.target))
+        self._inputs.begin(memory)
         while len(rows) < steps and not (rows and rows[-1].done):
             if schedule is not None:
                 command = jnp.asarray(schedule[len(rows)])
@@ -114,7 +117,7 @@ class Player:
             np.asarray(told.joint_pos) + reference,
             np.asarray(told.gravity),
             np.asarray(told.angvel),
-            np.concatenate([told.inputs[term.name] for term in self.env.input_terms]),
+            self._inputs.read(memory, told),
         )
 
     def _reading(self, memory: Memory, state: PhysicsState) -> Sample:

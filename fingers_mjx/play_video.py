@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from fingers_mjx.play import Played
+from fingers_mjx.play_target import Target, target_of, with_target
 from fingers_mjx.raycast_camera import Camera
 from fingers_mjx.raycast_overlay import caption
 from fingers_mjx.video import Frame, follow, frames, write_animation, write_mp4
@@ -40,12 +41,13 @@ def write_video(
     """
     steps = frame_steps(len(played.qpos), dt_s, fps)
     qpos = played.qpos[steps]
-    cameras = follow(_view(qpos[0]), qpos[:, :3], fps)
+    cameras = follow(_view(qpos[0], target_of(played)), qpos[:, :3], fps)
     size = (width, 2 * round(width * ASPECT / 2))
     pictures = frames(model, qpos, cameras, size)
+    marked = with_target(pictures, cameras, target_of(played))
     texts = [_text(played, step, dt_s) for step in steps]
     write = write_mp4 if path.suffix == ".mp4" else write_animation
-    return write(path, _captioned(pictures, texts, progress), fps)
+    return write(path, _captioned(marked, texts, progress), fps)
 
 
 def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
@@ -55,17 +57,20 @@ def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
     return np.minimum(steps, poses - 1)
 
 
-def _view(qpos: Float[np.ndarray, " nq"]) -> Camera:
-    """Returns a view from the front left of where the hand points."""
+def _view(qpos: Float[np.ndarray, " nq"], target_w: Target) -> Camera:
+    """Returns a view from the front left of where the hand points.
+
+    Where there is a target, it is from farther away and above.
+    """
     w, x, y, z = qpos[3:7]
     # The fingers point along the palm's z.
     heading = np.arctan2(2 * (y * z - w * x), 2 * (x * z + w * y))
     ahead = AHEAD_M * np.array([np.cos(heading), np.sin(heading)])
     return Camera(
         lookat_w=(float(ahead[0]), float(ahead[1]), 0.06),
-        distance_m=0.45,
+        distance_m=0.45 if target_w is None else 0.80,
         azimuth_deg=float(np.degrees(heading)) + 248.0,
-        elevation_deg=-18.0,
+        elevation_deg=-18.0 if target_w is None else -35.0,
     )
 
 
@@ -84,6 +89,9 @@ def _text(played: Played, step: int, dt_s: float) -> str:
     row = min(step, len(played.trace.command) - 1)
     x, y, turn = played.trace.command[row]
     words = f"command: forward {x:+.2f} m/s, left {y:+.2f} m/s, turn {turn:+.2f} rad/s"
+    if "target_error_m" in played.trace.extra:
+        error_m = played.trace.extra["target_error_m"][row]
+        words = f"cube {100 * error_m:.1f} cm from its target"
     if "settling" in played.trace.extra and not np.any((x, y, turn)):
         words = _stage(played, row)
     return f"{step * dt_s:4.1f} s   {words}"

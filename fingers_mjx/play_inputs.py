@@ -1,0 +1,57 @@
+"""The task's inputs in the closed loop, as the shim works them out on the robot."""
+
+from typing import Any
+
+import jax
+import numpy as np
+from jaxtyping import Float
+
+from envs.batch import BatchEnv
+from envs.camera import read_camera
+from envs.memory import Memory
+from envs.observations import Sample
+from envs.push import PushMemory
+from envs.push_scene import HALF_M
+from fingers_deploy.tracking import Frame, ObjectTracker
+
+
+class PlayInputs:
+    """Inputs of one episode after another.
+
+    What an operator gives is taken from the memory; what a camera tells goes through
+    the shim's own tracker.
+
+    Args:
+        env: worlds of the task.
+    """
+
+    def __init__(self, env: BatchEnv):
+        self._env = env
+        self._tracker: ObjectTracker | None = None
+
+    def begin(self, memory: Memory) -> None:
+        """Begins an episode: a tracked object has another target."""
+        if isinstance(memory.task, PushMemory):
+            target_w = np.append(np.asarray(memory.task.target_w), HALF_M)
+            self._tracker = ObjectTracker(target_w, self._env.stance.q_off)
+
+    def read(self, memory: Memory, told: Sample) -> Float[np.ndarray, " inputs"]:
+        """Returns the inputs of a control step, term after term.
+
+        Args:
+            memory: before the step.
+            told: what the sensors tell.
+        """
+        if self._tracker is None:
+            terms = self._env.input_terms
+            return np.concatenate([np.asarray(told.inputs[t.name]) for t in terms])
+        self._tracker.update(_frame(memory.task))
+        return self._tracker.inputs(np.asarray(told.gravity))
+
+
+def _frame(task: PushMemory) -> Frame:
+    """Returns the sample that the simulated camera delivers."""
+    seen: Any = jax.device_get(read_camera(task.camera))
+    return Frame(
+        float(seen.t_s), seen.object_pos_w, seen.root_pos_w, float(seen.heading_rad)
+    )
