@@ -12,6 +12,7 @@ from typing import Any
 from fingers_deploy.runtime.launcher import EXIT_PREFLIGHT, Launcher
 
 HELP = "type: arm, stop, clear, policy N, status, quit"
+REFUSED = 2  # exit status of a process that refuses its input
 _RETRY_S = 0.5
 _ARM_WITHIN_S = 15.0
 
@@ -53,16 +54,15 @@ class Console:
         self._launcher, self._arm = launcher, arm
         self._start_s = self._asked_s = time.monotonic()
         self._duration_s = duration_s
-        self._armed = self._quitting = False
+        self._armed = self._quitting = self._helped = False
         self._input_open = True
 
     def run(self) -> int:
         """Serves the operator until the run is over; returns the exit status."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, lambda *_: self._quit())
-        if not self._arm:
-            _say(HELP)
         while self._launcher.poll(0.05):
+            self._help()
             self._read_input()
             self._step()
         status = self._launcher.finish()
@@ -70,6 +70,12 @@ class Console:
         return (
             EXIT_PREFLIGHT if status == 0 and self._arm and not self._armed else status
         )
+
+    def _help(self) -> None:
+        """Says once what may be typed, when there is something to type at."""
+        if not (self._arm or self._helped) and self._launcher.status:
+            self._helped = True
+            _say(HELP)
 
     def _step(self) -> None:
         now, mode = time.monotonic(), self._launcher.status.get("mode")
@@ -82,6 +88,8 @@ class Console:
                 self._asked_s = now
                 self._launcher.send("arm")
         counts = self._armed or not self._arm
+        if self._launcher.policy.poll() == REFUSED:
+            self._quit()
         longest_s = math.inf if self._duration_s is None else self._duration_s
         if counts and now - self._start_s > longest_s:
             self._quit()

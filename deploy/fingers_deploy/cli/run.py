@@ -2,11 +2,13 @@
 
 import argparse
 import contextlib
+import importlib.util
 import math
+from pathlib import Path
 from typing import Any
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.cli.console import drive
+from fingers_deploy.cli.console import REFUSED, drive
 from fingers_deploy.drivers.open import KINDS, open_driver
 from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_deploy.errors import InputError
@@ -22,7 +24,9 @@ def add_run(commands: Any) -> None:
     parser.add_argument("bundles", nargs="+", help="folders or ONNX files")
     _add_driver(parser)
     _add_loop(parser)
-    parser.add_argument("--runtime", default="auto", help="auto, onnxruntime or numpy")
+    parser.add_argument(
+        "--runtime", choices=("auto", "onnxruntime", "numpy"), default="auto"
+    )
     parser.add_argument("--joystick", metavar="DEVICE", help="e.g. /dev/input/js0")
     parser.add_argument(
         "--sticks", type=float, nargs="*", default=[], help="fixed sticks, −1 to 1"
@@ -87,7 +91,7 @@ def run(options: argparse.Namespace) -> int:
             and {"gain": heading[0], "offset_rad_s": heading[1]},
         }
         status = drive(plain, options.arm, options.duration)
-        if options.driver == "sim":
+        if options.driver == "sim" and status != REFUSED:
             _tell_distance(driver["socket"], bundles[0].manifest.interface)
         return status
 
@@ -184,5 +188,17 @@ def _check(options: argparse.Namespace) -> None:
     if options.arm and kind == "wuji" and not options.dry_run:
         valid = "typing arm at the console"
         raise InputError("--arm", "", "a real hand", valid)
+    if kind == "wuji" and importlib.util.find_spec("wujihandpy") is None:
+        valid = "pip install wujihandpy, or the extra [hand]"
+        raise InputError("--driver wuji", "", "no wujihandpy", valid)
     if not 50.0 <= options.loop_hz <= 1000.0:
         raise InputError("--loop-hz", "", options.loop_hz, "50 to 1000")
+    if not all(abs(stick) <= 1.0 for stick in options.sticks):
+        raise InputError("--sticks", "", options.sticks, "numbers from -1 to 1")
+    hold = options.heading_hold or ()
+    if not all(map(math.isfinite, hold)):
+        raise InputError("--heading-hold", "", hold, "finite numbers")
+    if options.duration is not None and not options.duration > 0:
+        raise InputError("--duration", "", options.duration, "above 0 s")
+    if not options.no_record and not Path(options.out).is_dir():
+        raise InputError("--out", "", options.out, "an existing folder")

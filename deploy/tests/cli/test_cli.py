@@ -36,6 +36,9 @@ def test_check_survives_a_runtime_that_dies_when_imported(
     assert "not usable here" in capsys.readouterr().out
 
 
+SIM = ("--driver", "sim", "--model", "x")
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -44,7 +47,12 @@ def test_check_survives_a_runtime_that_dies_when_imported(
         (["run", "BUNDLE", "--driver", "sim"], "--model"),
         (["run", "BUNDLE", "--driver", "replay"], "--log"),
         (["run", "BUNDLE", "--driver", "wuji", "--arm"], "typing arm"),
-        (["run", "BUNDLE", "--driver", "sim", "--model", "x", "--loop-hz", "7"], "50"),
+        (["run", "BUNDLE", *SIM, "--loop-hz", "7"], "50"),
+        (["run", "BUNDLE", *SIM, "--sticks", "nan", "0", "0"], "from -1 to 1"),
+        (["run", "BUNDLE", *SIM, "--sticks", "5"], "from -1 to 1"),
+        (["run", "BUNDLE", *SIM, "--heading-hold", "inf", "0"], "finite"),
+        (["run", "BUNDLE", *SIM, "--duration", "-1"], "above 0"),
+        (["run", "BUNDLE", *SIM, "--out", "nowhere"], "existing folder"),
         (["run", "BUNDLE", "--driver", "sim", "--model", "nowhere.xml"], "nowhere.xml"),
         (["log", "nowhere"], "nowhere"),
     ],
@@ -146,6 +154,22 @@ def test_the_policy_of_another_hand_order_is_refused_by_the_supervisor(
     assert done.returncode == 2
     assert "interface.v_quat_b" in done.stderr
     assert "Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (["run", "--joystick", "/dev/none"], "a gamepad"),
+        (["record", "--plan", "nowhere.csv"], "nowhere.csv"),
+        (["run", "--socket", "nowhere"], "driver: "),
+    ],
+)
+def test_what_a_process_refuses_ends_the_run(hand_model, marching_dir, more, words):
+    name, *options = more
+    driver = ["--driver", "sim", "--model", hand_model, "--no-record"]
+    done = _run(name, marching_dir, *driver, *options)
+    assert done.returncode in (2, 6) and words in done.stderr
+    assert len(done.stderr.splitlines()) == 1
 
 
 def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
