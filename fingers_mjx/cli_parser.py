@@ -6,7 +6,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
-from fingers_mjx.cli_parser_sysid import add_excite
+from fingers_mjx.cli_parser_sysid import add_calibrate, add_diagnose, add_excite
 
 MAX_SEED = 2**32 - 1
 STANCE_STARTS = 40
@@ -284,6 +284,8 @@ def _sysid(commands) -> None:
         "--map", type=Path, metavar="FILE", help="topics and names of a bag, as YAML"
     )
     add_excite(actions, whole, number)
+    add_calibrate(actions)
+    add_diagnose(actions, whole, number)
 
 
 def _demo(commands) -> None:

@@ -1,4 +1,4 @@
-"""What can be typed after `fingers sysid excite` and `fingers sysid calibrate`."""
+"""What can be typed after `fingers sysid excite`, `diagnose` and `calibrate`."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -59,6 +59,30 @@ def add_excite(actions, whole: Callable, number: Callable) -> None:
     parser.add_argument("-o", "--out", type=Path, metavar="DIR", default=Path("excite"))
 
 
+def add_calibrate(actions) -> None:
+    """Adds `fingers sysid calibrate`."""
+    parser = actions.add_parser(
+        "calibrate",
+        help="measure stiffness, delay, cutoff, speed and tip friction",
+        description="Fits Table I to records of a hand on a stand: stiffness, delay, "
+        "cutoff and speed of every joint that moves, and the friction of fingertips "
+        "from loaded pulls (logs with a setting normal_n and a column "
+        "force.<finger>). Writes hand.yaml, calibration.json and pictures.",
+        allow_abbrev=False,
+    )
+    parser.set_defaults(module="cli_sysid_calibrate")
+    parser.add_argument(
+        "logs", type=Path, nargs="+", metavar="LOG", help="CSV, Parquet, MCAP, bag"
+    )
+    parser.add_argument(
+        "--map", type=Path, metavar="FILE", help="topics and names of a bag, as YAML"
+    )
+    add_mechanism(parser)
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="DIR", default=Path("calibration")
+    )
+
+
 def add_mechanism(parser) -> None:
     """Adds what says which mechanism it is."""
     parser.add_argument(
@@ -68,3 +92,30 @@ def add_mechanism(parser) -> None:
         "--mjcf", type=Path, metavar="FILE", help="another mechanism, with --drive"
     )
     parser.add_argument("--drive", type=Path, metavar="FILE", help="drive.yaml")
+
+
+def add_diagnose(actions, whole: Callable, number: Callable) -> None:
+    """Adds `fingers sysid diagnose`."""
+    parser = actions.add_parser(
+        "diagnose",
+        help="name what the simulation lacks",
+        description="Compares records with the simulation and names the effects that "
+        "it lacks: OUT/diagnosis.json, OUT/report.html and, for the hand, "
+        "OUT/hand.yaml with the effects in it.",
+        allow_abbrev=False,
+    )
+    parser.set_defaults(module="cli_sysid_diagnose")
+    parser.add_argument(
+        "logs", nargs="+", type=Path, metavar="LOG", help="CSV, Parquet, MCAP, bag"
+    )
+    add_mechanism(parser)
+    parser.add_argument(
+        "--map", type=Path, metavar="FILE", help="topics and names of a bag, as YAML"
+    )
+    parser.add_argument("--seed", type=whole(0, 2**32 - 1), default=0, help="default 0")
+    parser.add_argument(
+        "--no-report", action="store_true", help="without OUT/report.html"
+    )
+    parser.add_argument(
+        "-o", "--out", type=Path, metavar="OUT", default=Path("diagnosis")
+    )

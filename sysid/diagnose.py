@@ -1,14 +1,45 @@
 """Names what the simulation of a mechanism lacks, from records of the mechanism.
 
-diagnosis = diagnose([read_log("knee.csv")], hand_mechanism(), seed=0)
-print(diagnosis.to_json())
+    diagnosis = diagnose([read_log("knee.csv")], hand_mechanism(), seed=0)
+    print(diagnosis.to_json())
+
+Every joint is searched for itself (`sysid.diagnose_search`); effects that several
+joints share are told once, with where they act.
 """
 
+import time
 from collections.abc import Sequence
+from dataclasses import dataclass
 
+import numpy as np
+
+from envs.errors import InputError
 from sysid.data import MeasuredLog
+from sysid.diagnose_problem import Problem, make_problem
+from sysid.diagnose_search import Search, search
+from sysid.diagnose_space import make_space
+from sysid.diagnose_tracks import JointTrack, all_tracks
+from sysid.diagnose_verdict import verdict_of
 from sysid.diagnosis import Diagnosis
 from sysid.mechanism import Mechanism
+
+LEAST_MOTION = 2e-3
+"""Least range of target or angle in which something can be seen [rad or m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What was done with one joint; for reports.
+
+    Attributes:
+        track: its measured motion.
+        problem: residuals and weights; None for a joint that did not move.
+        search: what was found; None likewise.
+    """
+
+    track: JointTrack
+    problem: Problem | None
+    search: Search | None
 
 
 def diagnose(
@@ -25,4 +56,41 @@ def diagnose(
     Raises:
         InputError: records that cannot be used, in one sentence.
     """
-    raise NotImplementedError
+    return examine(logs, mechanism, seed)[0]
+
+
+def examine(
+    logs: Sequence[MeasuredLog], mechanism: Mechanism, seed: int = 0
+) -> tuple[Diagnosis, list[Examined]]:
+    """Does the same and also returns what was done with every joint."""
+    started = time.monotonic()
+    if not logs:
+        raise InputError("logs", "", "no record", "at least one")
+    tracks = all_tracks(logs, mechanism)
+    examined = [_examined(track, logs, mechanism) for track in tracks]
+    found = verdict_of(examined, mechanism, seed)
+    return (
+        Diagnosis(
+            **found,
+            log_sha256=tuple(log.sha256 for log in logs),
+            seed=seed,
+            runtime_s=round(time.monotonic() - started, 3),
+        ),
+        examined,
+    )
+
+
+def _examined(
+    track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism
+) -> Examined:
+    """Searches one joint, if it moved."""
+    drive = mechanism.drives[track.joint]
+    moved = max(np.ptp(np.asarray(track.track.cmd)), track.angle_scale)
+    if moved < LEAST_MOTION or not np.any(track.valid):
+        return Examined(track, None, None)
+    alone = not np.any(np.asarray(track.track.others_nm))
+    known = {"others_nm": True, "gravity": True, "other_q": not alone}
+    known["other_nm"] = known["other_q"]
+    problem = make_problem(track, make_space(track, drive, known), logs, drive.known)
+    result = search(problem)
+    return Examined(track, result.problem, result)

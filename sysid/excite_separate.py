@@ -26,11 +26,11 @@ from envs.hand.effects.base import EffectKind
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.effects.chain import chain_step, init_states
 from envs.hand.effects.joint import joint_step
-from envs.hand.effects.surroundings import Gravity, Surroundings
-from envs.quiet_mujoco import mujoco
-from sysid.excite import Plan, joint_address
+from envs.hand.effects.surroundings import Surroundings
+from sysid.excite import Plan
 from sysid.excite_check import STEP_S
 from sysid.mechanism import JointDrive, Mechanism
+from sysid.rigid import gravity_torque, rigid_along
 
 NEEDED_NAT = 6.0
 """Evidence from which on an effect counts as seen, or as told apart."""
@@ -177,7 +177,7 @@ def _bench(mechanism: Mechanism, plan: Plan, joint: str) -> _Bench:
             start, stop = segment.start_s * plan.rate_hz, segment.stop_s * plan.rate_hz
             rows[round(start) : round(stop)] = True
     targets, drive = plan.targets[rows], mechanism.drives[joint]
-    around, stiffness, inertia = _rigid(mechanism, targets, j)
+    around, stiffness, inertia = rigid_along(mechanism, targets, j)
     return _Bench(
         targets=targets[:, j],
         stiffness=stiffness,
@@ -189,77 +189,6 @@ def _bench(mechanism: Mechanism, plan: Plan, joint: str) -> _Bench:
     )
 
 
-_EVERY = 4
-"""Rows between two postures that are evaluated; joints move little in between."""
-
-
-def _rigid(mechanism: Mechanism, targets: np.ndarray, j: int):
-    """Returns what surrounds a joint along targets, gravity's stiffness, inertia."""
-    model, data = mechanism.model, mujoco.MjData(mechanism.model)
-    qpos, dofs = joint_address(mechanism)
-    found: list[tuple[np.ndarray, ...]] = []
-    inertia, unit, moved = [], np.eye(model.nv)[dofs[j]], np.zeros(model.nv)
-    slopes = []
-    for posture in targets[::_EVERY]:
-        data.qpos[qpos] = posture
-        data.qpos[qpos[j]] += 1e-3
-        mujoco.mj_forward(model, data)
-        ahead = _moments(model, data, int(dofs[j]))[0]
-        data.qpos[qpos[j]] -= 1e-3
-        mujoco.mj_forward(model, data)
-        found.append(_moments(model, data, int(dofs[j])))
-        slopes.append((ahead - found[-1][0]) @ model.opt.gravity / 1e-3)
-        mujoco.mj_mulM(model, data, moved, unit)
-        inertia.append(moved[dofs[j]])
-    moment, payload, shift = (
-        np.repeat(np.array(x), _EVERY, 0)[: len(targets)]
-        for x in zip(*found, strict=True)
-    )
-    payload_kg = model.body_mass[_carrier(model, int(dofs[j]))]
-    other = j + 1 if j + 1 < targets.shape[1] else j - 1
-    rows = len(targets)
-    gravity = Gravity(
-        gravity=jnp.tile(jnp.asarray(model.opt.gravity), (rows, 1)),
-        moment=jnp.asarray(moment),
-        payload_kg=jnp.full(rows, payload_kg),
-        payload_moment=jnp.asarray(payload),
-        payload_shift=jnp.asarray(shift),
-        payload_inertia=jnp.sum(jnp.asarray(payload) ** 2, -1),
-    )
-    around = Surroundings(
-        others_nm=None,
-        other_q=jnp.asarray(targets[:, other] if other >= 0 else np.zeros(rows)),
-        other_nm=jnp.zeros(rows),
-        gravity=gravity,
-    )
-    stiffness = np.repeat(slopes, _EVERY)[:rows]
-    return around, stiffness, float(np.mean(inertia))
-
-
-def _carrier(model: mujoco.MjModel, dof: int) -> int:
-    """Returns the last body of a joint's chain, which would carry a payload."""
-    body = int(model.dof_bodyid[dof])
-    for child in range(body + 1, model.nbody):
-        if model.body_parentid[child] == body:
-            body = child
-    return body
-
-
-def _moments(model: mujoco.MjModel, data: mujoco.MjData, dof: int):
-    """Returns moments a × r of what a joint carries and of its payload.
-
-    That is: of all masses [kg·m], of a payload of 1 kg [m], and the change of the
-    latter by a shift along the axes of its body.
-    """
-    jacobian, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-    body, carrier = int(model.dof_bodyid[dof]), _carrier(model, dof)
-    mujoco.mj_jacSubtreeCom(model, data, jacobian, body)
-    moment = model.body_subtreemass[body] * jacobian[:, dof]
-    mujoco.mj_jacBodyCom(model, data, jacobian, turns, carrier)
-    axis, frame = turns[:, dof], data.xmat[carrier].reshape(3, 3)
-    return moment, jacobian[:, dof].copy(), np.cross(axis, frame.T)
-
-
 def _kinds(drive: JointDrive) -> dict[str, EffectKind]:
     """Effects that a single joint shows; those of the drive come along."""
     names = [name for name, kind in CATALOGUE.items() if _local(kind)]
@@ -269,13 +198,6 @@ def _kinds(drive: JointDrive) -> dict[str, EffectKind]:
 def _local(kind: EffectKind) -> bool:
     """Whether one joint shows it; that a whole finger is weak, it cannot know."""
     return bool(kind.acts) and kind.name != "finger_weakness"
-
-
-def _loads(bench: _Bench) -> Float[np.ndarray, " n"]:
-    """Torque of gravity along the targets [N·m]."""
-    world = bench.around.gravity
-    assert world is not None
-    return np.sum(np.asarray(world.moment) * np.asarray(world.gravity), -1)
 
 
 def _base(drive: JointDrive, kinds) -> dict[str, dict[str, float]]:
@@ -292,7 +214,7 @@ def _sizes(drive: JointDrive, kinds, bench: _Bench) -> dict[str, dict]:
     """All effects one by one, each at a size that such a joint may have."""
     rest = _base(drive, kinds)
     speed = np.max(np.abs(np.diff(bench.targets))) / bench.repeat / STEP_S
-    torque = max(np.max(np.abs(_loads(bench))), 0.01 * bench.kp)
+    torque = max(np.max(np.abs(gravity_torque(bench.around))), 0.01 * bench.kp)
     sizes = {}
     for name, kind in kinds.items():
         values = dict(rest[name])
@@ -337,7 +259,7 @@ def _stacked(candidates: list[dict]):
 
 def _simulate(names: tuple[str, ...], stacked, bench: _Bench):
     """Returns readings and efforts of all candidates (candidates, rows, 2)."""
-    rows = (bench.targets, _loads(bench), bench.stiffness, bench.around)
+    rows = (bench.targets, gravity_torque(bench.around), bench.stiffness, bench.around)
     rows = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), rows)
     figures = (bench.inertia, bench.kp, bench.kd)
     return _run(names, bench.repeat, stacked, rows, figures)

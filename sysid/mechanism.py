@@ -45,11 +45,13 @@ class JointDrive:
     Attributes:
         kp: position gain [N·m/rad, or N/m].
         kd: velocity gain [N·m·s/rad, or N·s/m].
-        kp_setting: name of a setting in the logs' headers that multiplies `kp` and
-            `kd_per_kp`; "" if the gain is the same in all records.
+        kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
+            the gain is the same in all records.
         effort: column that tells the effort of the drive.
         effort_scale: N·m (or N) per unit of that column.
         effects: effects that the simulation has, with their parameters by name.
+        known: `controller` where unknown forces push on the joint, `mechanics` where
+            the law of the controller is not known: only that part is examined then.
     """
 
     kp: Figure
@@ -58,6 +60,7 @@ class JointDrive:
     effort: Effort = "tau"
     effort_scale: Figure = field(default_factory=lambda: Figure(1.0, 0.02))
     effects: dict[str, dict[str, Figure]] = field(default_factory=dict)
+    known: Literal["both", "controller", "mechanics"] = "both"
 
     def __post_init__(self) -> None:
         for name, parameters in self.effects.items():
@@ -70,7 +73,7 @@ class JointDrive:
 
 @dataclass(frozen=True)
 class DriveFile:
-    """`drive.yaml`: drives by joint name of the MJCF; `*` for all that are not named."""
+    """`drive.yaml`: drives by joint name of the MJCF; `*` for all others."""
 
     schema: int
     joints: dict[str, JointDrive]
@@ -101,6 +104,10 @@ class Mechanism:
         """Names of the joints in the order of the model."""
         return tuple(self.drives)
 
+    def is_slide(self, joint: str) -> bool:
+        """Tells whether a joint moves along a line."""
+        return self.model.joint(joint).type[0] == int(mujoco.mjtJoint.mjJNT_SLIDE)
+
 
 def mjcf_mechanism(mjcf: str | Path, drive: str | Path) -> Mechanism:
     """Makes the mechanism of a user: an MJCF file and `drive.yaml`.
@@ -125,7 +132,7 @@ def model_mechanism(
     """
     simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
     names = [model.joint(i).name for i in range(model.njnt)]
-    movable = [n for n in names if model.joint(n).type[0] in simple]
+    movable = [n for n in names if model.joint(n).type[0] in list(map(int, simple))]
     for name in drives:
         if name != "*" and name not in movable:
             raise InputError(source, "joints", name, one_of(movable, name))

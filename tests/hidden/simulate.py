@@ -65,14 +65,16 @@ def _run(mechanism, plant, data, drives, steps: int, h: float) -> Motion:
     out = np.empty((steps, 4, n))
     couplings = _couplings(mechanism)
     applied, strength = data.qfrc_applied, 1.0
-    qpos, qvel, bias = data.qpos, data.qvel, data.qfrc_bias
+    qpos, qvel, qacc, bias = data.qpos, data.qvel, data.qacc, data.qfrc_bias
     forces = [0.0] * n
     for k in range(steps):
         t = k * h
         total = 0.0
         for i, drive, link, motor in pairs:
             q, v, qm = qpos.item(link), qvel.item(link), qpos.item(motor)
-            torque = drive.drive(t, qm, qvel.item(motor), strength)
+            # MuJoCo's speeds are half a step older than its angles.
+            speed = qvel.item(motor) + 0.5 * h * qacc.item(motor)
+            torque = drive.drive(t, qm, speed, strength)
             forces[i] = drive.resist(q, v, -bias.item(link))
             total += abs(torque)
             row = out[k]

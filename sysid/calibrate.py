@@ -1,0 +1,207 @@
+"""Table I of the paper from logs: stiffness, friction, delay, speed and cutoff.
+
+    found = calibrate([read_log("index.csv")], hand_mechanism())
+    hand = calibrated_hand(load_hand_file(), found)
+
+Joints are fitted one by one (`sysid.calibrate_joint`); what all joints share is the
+mean of theirs, weighed by their intervals, and its interval is at least as wide as
+they scatter. Records of loaded pulls (`sysid.calibrate_friction`) give the friction.
+"""
+
+import dataclasses
+import hashlib
+import json
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import t as student
+
+from envs.errors import InputError
+from envs.hand.figures import figures
+from envs.hand.hand_file import HandFile, JointQuantity, Quantity
+from sysid.calibrate_friction import Pull, is_pull, pull_of
+from sysid.calibrate_joint import JointFit, fit_joint
+from sysid.data import MeasuredLog
+from sysid.diagnosis import Estimate
+from sysid.mechanism import Mechanism
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """What a calibration found.
+
+    Attributes:
+        joints: fits by joint.
+        pulls: loaded pulls of fingertips.
+        shared: `delay_s`, `lowpass_hz`, `speed_flexion`, `speed_abduction`,
+            `tip_friction`, as far as the records show them.
+        log_sha256: digests of the records.
+    """
+
+    joints: dict[str, JointFit]
+    pulls: tuple[Pull, ...]
+    shared: dict[str, Estimate]
+    log_sha256: tuple[str, ...]
+
+    @property
+    def digest(self) -> str:
+        """One digest for all records."""
+        if len(self.log_sha256) == 1:
+            return self.log_sha256[0]
+        return hashlib.sha256("".join(self.log_sha256).encode()).hexdigest()
+
+    def to_json(self) -> str:
+        """Returns all figures with their intervals."""
+        joints = {
+            joint: {"rms": f.rms}
+            | {n: [f.values[n], f.low[n], f.high[n]] for n in f.low}
+            for joint, f in self.joints.items()
+        }
+        data = {
+            "shared": {k: dataclasses.asdict(v) for k, v in self.shared.items()},
+            "joints": joints,
+            "pulls": [dataclasses.asdict(pull) for pull in self.pulls],
+            "log_sha256": list(self.log_sha256),
+        }
+        return json.dumps(_without_nan(data), indent=2, allow_nan=False)
+
+
+def calibrate(
+    logs: Sequence[MeasuredLog],
+    mechanism: Mechanism,
+    tell: Callable[[str], object] = lambda text: None,
+) -> Calibration:
+    """Calibrates all joints that the records move, and the friction of the tips.
+
+    Args:
+        logs: records on a stand; those with a setting `normal_n` are loaded pulls.
+        mechanism: the simulation as it stands.
+        tell: hears what is being done.
+
+    Raises:
+        InputError: records that cannot be used, or that move nothing.
+    """
+    moving = [log for log in logs if not is_pull(log)]
+    pulls = tuple(pull_of(log) for log in logs if is_pull(log))
+    fits = {}
+    for joint in dict.fromkeys(j for log in moving for j in log.header.joints):
+        chosen = [log for log in moving if _moves(log, joint)]
+        if chosen:
+            tell(f"fitting {joint}")
+            fits[joint] = fit_joint(mechanism, chosen, joint)
+    if not fits and not pulls:
+        source = logs[0].source if logs else "logs"
+        raise InputError(source, "", "nothing that moves", "joints that move, or pulls")
+    digests = tuple(log.sha256 for log in logs)
+    return Calibration(fits, pulls, _shared(mechanism, fits, pulls), digests)
+
+
+def _moves(log: MeasuredLog, joint: str) -> bool:
+    """Whether the log moves a joint by more than a hundredth of a radian."""
+    name = f"cmd.{joint}"
+    return name in log.columns and float(np.ptp(log.samples(name)[1])) > 0.01
+
+
+def _shared(mechanism: Mechanism, fits, pulls) -> dict[str, Estimate]:
+    """Figures that joints share."""
+    abduction = set(mechanism.classes.get("abduction", ()))
+    groups = {
+        "delay_s": ("delay_s", "s", list(fits.values())),
+        "lowpass_hz": ("lowpass_hz", "Hz", list(fits.values())),
+        "speed_flexion": (
+            "speed_limit",
+            "rad/s",
+            [f for j, f in fits.items() if j not in abduction],
+        ),
+        "speed_abduction": (
+            "speed_limit",
+            "rad/s",
+            [f for j, f in fits.items() if j in abduction],
+        ),
+    }
+    found = {}
+    for name, (figure, unit, chosen) in groups.items():
+        seen = [f for f in chosen if np.isfinite(f.low[figure])]
+        if seen:
+            values = np.array([f.values[figure] for f in seen])
+            spread = np.array([max(f.deviation(figure), 1e-12) for f in seen])
+            found[name] = weighed_mean(values, spread, unit)
+    if pulls:
+        values = np.array([pull.friction for pull in pulls])
+        spread = np.array([pull.deviation for pull in pulls])
+        found["tip_friction"] = weighed_mean(values, spread, "1")
+    return found
+
+
+def weighed_mean(values: np.ndarray, deviation: np.ndarray, unit: str) -> Estimate:
+    """Returns the weighed mean with a 95 % interval.
+
+    Weights 1 / (s_i² + τ²), with the scatter τ² between the joints that their own
+    deviations do not explain (DerSimonian and Laird 1986); Student's t for few.
+    """
+    count = len(values)
+    weight = deviation**-2.0
+    mean = np.sum(weight * values) / np.sum(weight)
+    excess = np.sum(weight * (values - mean) ** 2) - (count - 1)
+    scale = np.sum(weight) - np.sum(weight**2) / np.sum(weight)
+    between = max(excess / scale, 0.0) if count > 1 else 0.0
+    weight = 1.0 / (deviation**2 + between)
+    mean = float(np.sum(weight * values) / np.sum(weight))
+    wide = float(student.ppf(0.975, count - 1)) if between > 0.0 else 1.96
+    half = wide / float(np.sqrt(np.sum(weight)))
+    return Estimate(mean, mean - half, mean + half, unit)
+
+
+def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
+    """Returns a hand file with what was found; the rest stays as it was.
+
+    Joints that were not measured keep stiffness, damping and speed.
+    """
+    source = f"identified from {found.digest}"
+    names, changes = figures().joint_names, {}
+    gains = {"stiffness_scale": "stiffness", "damping_scale": "damping"}
+    fits = {j: f for j, f in found.joints.items() if j in names}
+    for field, figure in gains.items():
+        if fits:
+            old = getattr(hand, field)
+            changes[field] = _per_joint(old, names, fits, figure, source, True)
+    if fits:
+        speed = _per_joint(hand.speed_limit, names, fits, "speed_limit", source, False)
+        changes["speed_limit"] = speed
+    for name in ("delay_s", "lowpass_hz", "tip_friction"):
+        if name in found.shared:
+            e, note = found.shared[name], "mean over what was measured"
+            unit = getattr(hand, name).unit
+            changes[name] = Quantity(e.value, unit, source, e.low, e.high, note)
+    return dataclasses.replace(hand, **changes)
+
+
+def _per_joint(
+    old: JointQuantity, names, fits, figure: str, source: str, factor: bool
+) -> JointQuantity:
+    """A figure of 20 joints, of which some were measured."""
+    was = old.per_joint()
+    value, low, high = (dict(zip(names, was.tolist(), strict=True)) for _ in range(3))
+    measured = []
+    for joint, fit in fits.items():
+        if np.isfinite(fit.low[figure]):
+            scale = float(was[names.index(joint)]) if factor else 1.0
+            value[joint] = scale * fit.values[figure]
+            low[joint], high[joint] = scale * fit.low[figure], scale * fit.high[figure]
+            measured.append(joint)
+    if not measured:
+        return old
+    rest = len(names) - len(measured)
+    kept = f"; the other {rest} as before ({old.source})" * bool(rest)
+    note = f"measured: {', '.join(measured)}{kept}"
+    return JointQuantity(value, old.unit, source, low, high, note)
+
+
+def _without_nan(data):
+    """Returns plain data in which what is not known is None."""
+    if isinstance(data, dict):
+        return {key: _without_nan(value) for key, value in data.items()}
+    if isinstance(data, list | tuple):
+        return [_without_nan(value) for value in data]
+    return None if isinstance(data, float) and not np.isfinite(data) else data

@@ -1,0 +1,139 @@
+"""One joint of a log on a fine grid of time: held targets, gravity, readings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from envs.errors import InputError
+from envs.quiet_mujoco import mujoco
+from sysid.data import MeasuredLog
+from sysid.data_timing import continuous_parts
+from sysid.excite import rest_posture
+from sysid.mechanism import Mechanism
+from sysid.rigid import gravity_torque, rigid_along
+
+STEP_S = 0.001
+_POSTURE_S = 0.01
+_SETTLE_S = 0.5
+_LEAST_ROWS = 50
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """A joint in one log.
+
+    Attributes:
+        t_s: time of every row from the start [s].
+        measured: angle [rad] and effort [N·m] of every row; NaN where none was read.
+        valid: which readings count: those that exist, but for half a second at the
+            start and after every gap, in which targets went out that nobody wrote down.
+        held: target at every step [rad].
+        load, load_slope: torque of gravity at every step and its change with the angle.
+        angle: measured angle at every step [rad].
+        inertia: mean inertia of the joint [kg·m²].
+    """
+
+    t_s: Float[np.ndarray, " n"]
+    measured: Float[np.ndarray, "n 2"]
+    valid: Bool[np.ndarray, "n 2"]
+    held: Float[np.ndarray, " m"]
+    load: Float[np.ndarray, " m"]
+    load_slope: Float[np.ndarray, " m"]
+    angle: Float[np.ndarray, " m"]
+    inertia: float
+
+    def at_rows(self, steps: Float[np.ndarray, "c m k"]) -> Float[np.ndarray, "c n k"]:
+        """Reads simulated steps at the times of the rows."""
+        place = np.clip(self.t_s / STEP_S, 0.0, steps.shape[1] - 1.001)
+        low = place.astype(int)
+        share = (place - low)[:, None]
+        return (1.0 - share) * steps[:, low] + share * steps[:, low + 1]
+
+
+def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:
+    """Prepares one joint of a log.
+
+    Raises:
+        InputError: a hand that is not on a stand, times that run backward, or too few
+            readings.
+    """
+    if log.header.mounting != "palm_fixed":
+        valid = "palm_fixed: joints are calibrated on a stand"
+        raise InputError(log.source, "mounting", log.header.mounting, valid)
+    if np.any(np.diff(log.t_s) < 0.0):
+        valid = "times that never run backward"
+        raise InputError(log.source, "t", "a step back", valid)
+    effort = _effort(mechanism, log, joint)
+    position = log.column(f"pos.{joint}")
+    t_s = log.t_s - log.t_s[0]
+    measured = np.stack([position, effort], 1)
+    valid = ~np.isnan(measured) & _settled(t_s)[:, None]
+    if valid[:, 0].sum() < _LEAST_ROWS:
+        found = f"{int(valid[:, 0].sum())} readings after {_SETTLE_S:g} s"
+        raise InputError(log.source, f"pos.{joint}", found, f"at least {_LEAST_ROWS}")
+    grid = np.arange(int(t_s[-1] / STEP_S) + 2) * STEP_S
+    load, slope, inertia = _gravity(mechanism, log, joint, grid)
+    return Record(
+        t_s=t_s,
+        measured=measured,
+        valid=valid,
+        held=_held(log, f"cmd.{joint}", grid),
+        load=load,
+        load_slope=slope,
+        angle=_between(log, f"pos.{joint}", grid),
+        inertia=inertia,
+    )
+
+
+def _settled(t_s: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
+    """Returns which rows are long after the start and after the last gap."""
+    starts = [t_s[part][0] for part in continuous_parts(t_s)]
+    since = t_s - np.array(starts)[np.searchsorted(starts, t_s, "right") - 1]
+    return since > _SETTLE_S
+
+
+def _effort(mechanism: Mechanism, log: MeasuredLog, joint: str) -> np.ndarray:
+    """Returns the effort [N·m], NaN if it was not logged."""
+    drive = mechanism.drives[joint]
+    name = f"{drive.effort}.{joint}"
+    if drive.effort == "none" or name not in log.columns:
+        return np.full(len(log), np.nan)
+    return drive.effort_scale.value * log.column(name)
+
+
+def _held(log: MeasuredLog, name: str, grid: np.ndarray) -> np.ndarray:
+    """Targets hold until the next one is sent.
+
+    A substep of the chain ends with what its filter makes of the target during it, and
+    the joint takes that for the beginning; that a target waits for the next substep is
+    half a substep on average. So targets are taken half a substep earlier.
+    """
+    t_s, values = log.samples(name)
+    last = np.searchsorted(t_s - log.t_s[0], grid - 0.5 * STEP_S, "right") - 1
+    return values[np.maximum(last, 0)]
+
+
+def _between(log: MeasuredLog, name: str, grid: np.ndarray) -> np.ndarray:
+    t_s, values = log.samples(name)
+    return np.interp(grid, t_s - log.t_s[0], values)
+
+
+def _gravity(mechanism: Mechanism, log: MeasuredLog, joint: str, grid: np.ndarray):
+    """Gravity's torque at every step, with its slope, and the joint's inertia."""
+    every = round(_POSTURE_S / STEP_S)
+    coarse = grid[::every]
+    postures = np.tile(rest_posture(mechanism), (len(coarse), 1))
+    for name in log.header.joints:
+        if name not in mechanism.joints:
+            valid = f"joints of the mechanism: {', '.join(mechanism.joints)}"
+            raise InputError(log.source, "joints", name, valid)
+        column = mechanism.joints.index(name)
+        postures[:, column] = _between(log, f"pos.{name}", coarse)
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, np.asarray(log.header.palm_quat_w))
+    pull = rotation.reshape(3, 3).T @ mechanism.model.opt.gravity
+    j = mechanism.joints.index(joint)
+    around, slope, inertia = rigid_along(mechanism, postures, j, pull)
+    fine = [np.interp(grid, coarse, x) for x in (gravity_torque(around), slope)]
+    return *fine, inertia

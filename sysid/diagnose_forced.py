@@ -1,0 +1,290 @@
+"""The actuator chain led along the measured motion, for many candidates at once.
+
+Instead of simulating the joint, the chain is run on the angles that were measured. Two
+residuals come out of every candidate, both in N·m:
+
+    controller:  measured effort − what the servo makes of target and measured angle
+    mechanics:   torque behind the gears + load − (I + J) q̈ − b q̇ − friction
+
+where the effort was logged it is also what enters the gears, so neither residual knows
+of errors in the other part; without it the servo's own torque enters. Nothing is
+integrated, so nothing drifts, sticks wrongly or needs an initial state.
+
+Candidates differ in numbers only: every effect of the catalogue is present, those that
+a candidate does not have at their identity. One compilation serves all of them.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from functools import partial
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.hand.effects.base import EffectKind, Stage
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.hand.effects.surroundings import Gravity, Surroundings
+from sysid.diagnose_records import SMOOTH_STEPS
+
+BAND_STEPS = 2.2
+"""Width of the Gaussian through which both residuals pass [steps of the grid]."""
+
+EVERY = 4
+"""Steps of the grid between two samples of a residual."""
+
+_HALF = 8
+TAPS = np.exp(-0.5 * (np.arange(-_HALF, _HALF + 1) / BAND_STEPS) ** 2)
+TAPS = TAPS / TAPS.sum()
+
+FINE_TAPS = np.exp(-0.5 * (np.arange(-4, 5) / SMOOTH_STEPS) ** 2)
+FINE_TAPS = FINE_TAPS / FINE_TAPS.sum()
+
+
+@flax.struct.dataclass
+class Track:
+    """Measured motion of one joint in all pieces (p), step by step (t).
+
+    Attributes:
+        cmd, pos, vel, acc: target, encoder angle and its derivatives.
+        slow_vel: speed that passed the band of the residuals, for friction.
+        effort: measured torque of the drive [N·m]; zero where it is not logged.
+        push: torque of all that is neither drive nor gravity [N·m].
+        ext: known push from outside, in its unit.
+        inertia: of the joint with all that it carries, in this posture [kg·m²].
+        moment, turned: moment of the carried masses, and the same a quarter turn on
+            [kg·m]; see `effects.surroundings.Gravity`.
+        gravity: in the frame of the mount [m/s²] (p, 3).
+        payload_moment, payload_shift, payload_inertia, payload_kg: of the payload.
+        others_nm, other_q, other_nm: what the neighbours do.
+        kp, kd: nominal gains by piece.
+        measured: 1 where the logged effort enters the gears, else 0 (p).
+        noise: noise of angle, its two derivatives and effort in the residuals' band.
+    """
+
+    cmd: Float[Array, "t p"]
+    pos: Float[Array, "t p"]
+    vel: Float[Array, "t p"]
+    acc: Float[Array, "t p"]
+    slow_vel: Float[Array, "t p"]
+    effort: Float[Array, "t p"]
+    push: Float[Array, "t p"]
+    ext: Float[Array, "t p"]
+    inertia: Float[Array, "t p"]
+    moment: Float[Array, "t p 3"]
+    turned: Float[Array, "t p 3"]
+    payload_moment: Float[Array, "t p 3"]
+    payload_shift: Float[Array, "t p 3 3"]
+    payload_inertia: Float[Array, "t p"]
+    others_nm: Float[Array, "t p"]
+    other_q: Float[Array, "t p"]
+    other_nm: Float[Array, "t p"]
+    gravity: Float[Array, "p 3"]
+    payload_kg: Float[Array, " p"]
+    kp: Float[Array, " p"]
+    kd: Float[Array, " p"]
+    measured: Float[Array, " p"]
+    noise: Float[Array, "4"]
+
+
+_STEPWISE = tuple(
+    f.name
+    for f in dataclasses.fields(Track)
+    if f.name not in ("gravity", "payload_kg", "kp", "kd", "measured", "noise")
+)
+
+
+WALKING = ("finger_weakness",)
+"""Effects on joints that only records of a walking hand tell from other effects."""
+
+
+def joint_effects() -> tuple[str, ...]:
+    """Returns the effects of the catalogue that a joint can have, in their order."""
+    return tuple(n for n, kind in CATALOGUE.items() if kind.acts and n not in WALKING)
+
+
+def _as_command(kind: EffectKind) -> EffectKind:
+    """Lets an effect on the age of readings act on the target instead.
+
+    All readings of a packet have one age. Seen from the readings, the target was sent
+    that much later.
+    """
+    act = kind.acts[Stage.READING]
+
+    def late(params, state, x, dt):
+        state, x2 = act(params, state, x.replace(reading=x.command), dt)
+        return state, x.replace(command=x2.reading)
+
+    return dataclasses.replace(kind, acts={Stage.COMMAND: late})
+
+
+def _pseudo(name: str, acts: Mapping[Stage, object], init=None) -> EffectKind:
+    extra = {"init": init} if init else {}
+    return EffectKind(name, "", {}, acts, {}, "", **extra)  # pyright: ignore
+
+
+def _slow(params, state, x, dt):
+    """Friction sees the speed without the noise of differentiation."""
+    return state, x.replace(qd=params["slow_vel"])
+
+
+def _enter(params, state, x, dt):
+    """Remembers the servo's torque and lets the measured one enter the gears."""
+    mixed = x.torque + params["measured"] * (params["effort"] - x.torque)
+    return x.torque, x.replace(torque=mixed)
+
+
+_SLOW = _pseudo("slow_speed", {Stage.FRICTION: _slow})
+_ENTER = _pseudo(
+    "measured_effort",
+    {Stage.TORQUE: _enter},
+    lambda params, target, q, dt: jnp.zeros_like(q),
+)
+KINDS = {
+    name: _as_command(CATALOGUE[name])
+    if Stage.READING in CATALOGUE[name].acts
+    else CATALOGUE[name]
+    for name in joint_effects()
+}
+
+
+@partial(jax.jit, static_argnames=("dt", "names"))
+def forced_residuals(
+    track: Track,
+    params: dict[str, dict[str, Float[Array, " c"]]],
+    nuisance: dict[str, Float[Array, " c"]],
+    friction_speed: Float[Array, ""],
+    dt: float,
+    names: tuple[str, ...],
+) -> tuple[Float[Array, "m p c"], Float[Array, "m p c"]]:
+    """Returns the residuals (controller, mechanics) of candidates c [N·m].
+
+    Where a joint may be at rest, its friction is whatever balances it: those samples
+    of the mechanics must not count. Near them friction turns round within the band.
+
+    Angles are noisy themselves, so both residuals are divided by the noise that a
+    candidate would have, relative to the simulation as it stands: otherwise the fit
+    would lower gains to silence the noise that they amplify.
+
+    Args:
+        track: the measured motion.
+        params: values of the parameters of the effects by name.
+        nuisance: `effort_gain`, `mass`, `push_gain` (factors), `skew_s` (age of the
+            angle against the effort).
+        friction_speed: speed below which a joint may be at rest.
+        dt: step of the grid [s].
+        names: effects in the order of the chain.
+    """
+    wide = {n: {k: v[None, :] for k, v in params[n].items()} for n in names}
+    figures = ("effort_gain", "mass", "skew_s", "push_gain")
+    gain, mass, skew, pushed = (nuisance[k][None, :] for k in figures)
+
+    def model(now):
+        effort = gain * now["effort"]
+        enter = {"effort": effort, "measured": track.measured[:, None]}
+        slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
+        body = tuple((KINDS[n], wide[n]) for n in names)
+        return ((_SLOW, slow), *body, (_ENTER, enter))
+
+    def step(carry, row):
+        states, shift, shift_speed = carry
+        now = {k: v[:, None] for k, v in row.items()}
+        q = now["pos"] + skew * now["vel"] - shift
+        qd = now["vel"] + skew * now["acc"] - shift_speed
+        moment = mass[..., None] * (now["moment"] - shift[..., None] * now["turned"])
+        gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
+        load = now["push"] + pushed * now["ext"] + jnp.sum(moment * gravity, -1)
+        payload_kg = jnp.broadcast_to(track.payload_kg[:, None], q.shape)
+        around = Surroundings(
+            others_nm=now["others_nm"],
+            other_q=now["other_q"],
+            other_nm=now["other_nm"],
+            gravity=Gravity(
+                gravity=gravity,
+                moment=moment,
+                payload_kg=payload_kg,
+                payload_moment=now["payload_moment"],
+                payload_shift=now["payload_shift"],
+                payload_inertia=now["payload_inertia"],
+            ),
+        )
+        kp, kd = track.kp[:, None], track.kd[:, None]
+        target = jnp.broadcast_to(now["cmd"], q.shape)
+        states, x = chain_step(
+            model(now), states, target, q, qd, load, kp, kd, dt, around
+        )
+        inertia = mass * now["inertia"] + x.inertia
+        loud, usual = _loudness(track, now, x, gain, inertia)
+        needs = x.torque + x.passive + x.load - inertia * now["acc"]
+        unit = gain * loud[1] / usual[1]
+        quiet = loud[0] / usual[0]
+        out = {
+            "servo": (now["effort"] - states[-1] / gain) / quiet,
+            "needs": needs / unit,
+            "command": x.command,
+            "follow": x.follows * x.kp / gain / quiet,
+            "enters": (1.0 - track.measured[:, None]) / unit * gain * quiet,
+            "friction": x.friction / unit,
+            "viscous": x.viscous / unit,
+        }
+        return (states, x.encoder - q, x.encoder_speed - qd), out
+
+    rows = {k: getattr(track, k) for k in _STEPWISE}
+    first = {k: v[0][:, None] for k, v in rows.items()}
+    q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
+    target0 = jnp.broadcast_to(first["cmd"], q0.shape)
+    start = (init_states(model(first), target0, q0, dt), 0.0 * q0, 0.0 * q0)
+    out = jax.lax.scan(step, start, rows)[1]
+    return _filtered(out, track.slow_vel[:, :, None], friction_speed)
+
+
+def _loudness(track, now, x, gain, inertia):
+    """Noise of the residuals of a candidate, and as the simulation stands [N·m]."""
+    angle, speed, acc, effort = (track.noise[k] for k in range(4))
+    kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
+    servo = jnp.hypot(x.kp * angle, x.kd * speed) / gain
+    usual_servo = jnp.hypot(kp * angle, kd * speed)
+    own = jnp.hypot(inertia * acc, x.viscous * speed) / gain
+    usual_own = now["inertia"] * acc
+    enters = servo + measured * (effort - servo)
+    usual_enters = usual_servo + measured * (effort - usual_servo)
+    loud = (jnp.hypot(servo, effort), jnp.hypot(own, enters))
+    usual = (jnp.hypot(usual_servo, effort), jnp.hypot(usual_own, usual_enters))
+    return loud, usual
+
+
+def _filtered(out, vel, friction_speed):
+    """Passes the signals through the band and subtracts friction."""
+    way = jnp.clip(vel / friction_speed, -1.0, 1.0)
+    rounded = out["follow"] * (_smooth(out["command"]) - out["command"])
+    needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
+    mechanics = _band(needs + out["enters"] * rounded)
+    return _band(out["servo"] - rounded), mechanics
+
+
+def _smooth(x: Float[Array, "t p c"]) -> Float[Array, "t p c"]:
+    """Smooths the command as the measured channels were.
+
+    The target is not smoothed before the chain: limits would act on round corners.
+    """
+    reach = len(FINE_TAPS) // 2
+    wide = jnp.pad(x, [(reach, reach), (0, 0), (0, 0)], "edge")
+    parts = [w * wide[k : k + len(x)] for k, w in enumerate(FINE_TAPS.tolist())]
+    return jnp.sum(jnp.stack(parts), 0)
+
+
+def _band(x: Float[Array, "t p c"]) -> Float[Array, "m p c"]:
+    """Gaussian mean of every `EVERY`-th step."""
+    count = (x.shape[0] - len(TAPS)) // EVERY + 1
+    last = (count - 1) * EVERY + 1
+    parts = [w * x[k : k + last : EVERY] for k, w in enumerate(TAPS.tolist())]
+    return jnp.sum(jnp.stack(parts), 0)
+
+
+def sample_rows(steps: int) -> np.ndarray:
+    """Returns the steps of the grid at which the residuals are sampled."""
+    count = (steps - len(TAPS)) // EVERY + 1
+    return _HALF + EVERY * np.arange(count)

@@ -1,0 +1,218 @@
+"""Records of one joint on an even time grid, as the fits read them.
+
+Angle and effort pass the same zero-phase smoothing, so linear relations between them
+stay exact; the target keeps its edges; where a reading is missing for long, the
+samples around do not count, and where the clock jumps, a new piece begins.
+"""
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from envs.errors import InputError
+from sysid.data import MeasuredLog
+from sysid.data_timing import column_timing, continuous_parts
+
+GRID_S = 0.004
+"""Step that a grid does not go much below [s]; slower logs keep their own."""
+
+MAX_FILL_S = 0.06
+"""Longest stretch without a reading that is bridged by a straight line [s]."""
+
+MIN_PIECE_S = 1.5
+"""Shorter pieces of a record are left out [s]."""
+
+SMOOTH_STEPS = 0.8
+"""Width of the smoothing of all channels [steps of the grid]."""
+
+MAX_BACKWARD = 0.01
+"""Share of steps into the past above which a clock cannot be used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """One stretch of one record without a jump of the clock, all joints (j).
+
+    Attributes:
+        log: index of the record that it is from.
+        t_s: times of the grid [s].
+        cmd: target, mean over the step that ends here [rad or m].
+        pos: encoder angle, smoothed.
+        vel, acc: first and second derivative of `pos`.
+        effort: effort in the unit of its column, smoothed; NaN if not logged.
+        ext: known push from outside in its unit; zero without.
+        valid: where readings support the values.
+    """
+
+    log: int
+    t_s: Float[np.ndarray, " n"]
+    cmd: Float[np.ndarray, "n j"]
+    pos: Float[np.ndarray, "n j"]
+    vel: Float[np.ndarray, "n j"]
+    acc: Float[np.ndarray, "n j"]
+    effort: Float[np.ndarray, "n j"]
+    ext: Float[np.ndarray, "n j"]
+    valid: Bool[np.ndarray, "n j"]
+
+
+def grid_step_s(logs: Sequence[MeasuredLog], joints: Sequence[str]) -> float:
+    """Returns the step of the common grid: a whole number of sampling periods [s]."""
+    names = [f"pos.{joint}" for joint in joints]
+    period = max(column_timing(log, n).period_s for log in logs for n in names)
+    return round(period * max(1, round(GRID_S / period)), 5)
+
+
+def pieces_of(
+    log: MeasuredLog, index: int, joints: Mapping[str, str], step_s: float
+) -> list[Piece]:
+    """Puts a record on a grid.
+
+    Args:
+        log: the record.
+        index: its place among the records.
+        joints: quantity that tells the effort by joint; `none` leaves it out.
+        step_s: step of the grid [s].
+
+    Returns:
+        Its pieces, without those that are too short.
+    """
+    pieces = []
+    for start, stop in _spans(log, f"pos.{next(iter(joints))}"):
+        if stop - start >= MIN_PIECE_S:
+            parts = [_joint(log, j, joints[j], start, stop, step_s) for j in joints]
+            kept = [part for part in parts if part is not None]
+            if len(kept) == len(parts):
+                stacked = {k: np.stack([p[k] for p in kept], 1) for k in kept[0]}
+                t_s = start + step_s * np.arange(len(stacked["pos"]))
+                pieces.append(Piece(log=index, t_s=t_s, **stacked))
+    return pieces
+
+
+def _spans(log: MeasuredLog, name: str) -> list[tuple[float, float]]:
+    """Returns (first, last) time of every stretch in which the clock runs evenly."""
+    t_s, _ = log.samples(name)
+    found = column_timing(log, name)
+    if found.backward.size > MAX_BACKWARD * len(t_s):
+        share = f"{found.backward.size} of {len(t_s)} steps into the past"
+        raise InputError(log.source, "t", share, "times that increase")
+    spans = []
+    for part in continuous_parts(t_s):
+        times = t_s[part]
+        gaps = np.flatnonzero(np.diff(times) > MAX_FILL_S + found.period_s)
+        edges = [0, *(gaps + 1), len(times)]
+        for low, high in itertools.pairwise(edges):
+            spans.append((float(times[low]), float(times[high - 1])))
+    return _joined(spans, found.period_s)
+
+
+def _joined(spans: list, period_s: float) -> list[tuple[float, float]]:
+    """Joins stretches with a hole that is short enough to be bridged."""
+    joined = [spans[0]]
+    for start, stop in spans[1:]:
+        if 0.0 <= start - joined[-1][1] <= MAX_FILL_S + period_s:
+            joined[-1] = (joined[-1][0], stop)
+        else:
+            joined.append((start, stop))
+    return joined
+
+
+def _joint(log, joint, effort, start, stop, step_s) -> dict | None:
+    """Puts one joint of one stretch on the grid."""
+    names = {"cmd": f"cmd.{joint}", "pos": f"pos.{joint}"}
+    names |= {"effort": f"{effort}.{joint}", "ext": f"ext.{joint}"}
+    names = {key: name for key, name in names.items() if name in log.columns}
+    period = column_timing(log, names["pos"]).period_s
+    every = max(1, round(step_s / period))
+    fine_s = step_s / every
+    fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
+    columns, valid = {}, np.ones(len(fine), bool)
+    for key, name in names.items():
+        t_s, values = _once(*log.samples(name))
+        inside = (t_s >= start - MAX_FILL_S) & (t_s <= stop + MAX_FILL_S)
+        if inside.sum() < 10:
+            return None
+        t_s, values = t_s[inside], values[inside]
+        if key == "cmd":
+            columns[key] = _held_mean(t_s, values, fine, fine_s)
+        else:
+            columns[key] = np.interp(fine, t_s, values)
+        reach = 1.6 * period if key != "cmd" else 2.0
+        valid &= _near(t_s, fine, reach)
+    sigma = SMOOTH_STEPS * every
+    smooth = {k: smoothed(v, sigma)[::every] for k, v in columns.items()}
+    slope = [smoothed(columns["pos"], sigma, k)[::every] for k in (1, 2)]
+    none = np.full(len(fine[::every]), np.nan)
+    return {
+        "cmd": _block_mean(columns["cmd"], every),
+        "pos": smooth["pos"],
+        "vel": slope[0] / fine_s,
+        "acc": slope[1] / fine_s**2,
+        "effort": smooth.get("effort", none),
+        "ext": smooth.get("ext", np.zeros(len(none))),
+        "valid": valid[::every],
+    }
+
+
+def smoothed(
+    x: Float[np.ndarray, " n"], sigma: float, order: int = 0
+) -> Float[np.ndarray, " n"]:
+    """Returns a Gaussian mean over the samples, or a derivative of it.
+
+        X(ω) (iω)ᵏ exp(−ω² σ² / 2)
+
+    The record is continued by its point reflection at both ends, so value and slope
+    stay continuous there.
+
+    Args:
+        x: evenly sampled signal.
+        sigma: width [samples].
+        order: k, of the derivative per sample.
+    """
+    pad = min(len(x) - 1, int(6 * sigma) + 8)
+    head, tail = 2 * x[0] - x[pad:0:-1], 2 * x[-1] - x[-2 : -pad - 2 : -1]
+    wide = np.concatenate([head, x, tail])
+    ends = np.linspace(wide[0], wide[-1], len(wide))
+    slope = (wide[-1] - wide[0]) / (len(wide) - 1)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(len(wide))
+    gain = (1j * omega) ** order * np.exp(-0.5 * (omega * sigma) ** 2)
+    out = np.fft.irfft(np.fft.rfft(wide - ends) * gain, len(wide))
+    out += (ends, slope, 0.0)[order]
+    return out[pad : pad + len(x)]
+
+
+def _block_mean(x: np.ndarray, every: int) -> np.ndarray:
+    """Returns the mean over the steps that end at every `every`-th."""
+    total = np.concatenate([np.full(every - 1, x[0]), x])
+    return np.convolve(total, np.ones(every) / every, "valid")[::every]
+
+
+def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Returns readings at increasing times; of several at one time the last."""
+    order = np.argsort(t_s, kind="stable")
+    t_s, values = t_s[order], values[order]
+    last = np.append(np.diff(t_s) > 0.0, True)
+    return t_s[last], values[last]
+
+
+def _held_mean(
+    t_s: np.ndarray, values: np.ndarray, grid: np.ndarray, step_s: float
+) -> Float[np.ndarray, " n"]:
+    """Returns the mean of a target that is held, over the step that ends on the grid.
+
+    What acts at a time is what was sent before it; the mean keeps the moment of a
+    change between two points of the grid.
+    """
+    edges = np.append(grid[0] - step_s, grid)
+    area = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(t_s))])
+    last = np.clip(np.searchsorted(t_s, edges, "right") - 1, 0, len(t_s) - 1)
+    total = area[last] + values[last] * (edges - t_s[last])
+    return np.diff(total) / np.diff(edges)
+
+
+def _near(t_s: np.ndarray, grid: np.ndarray, within_s: float) -> np.ndarray:
+    """Tells at which points of the grid both neighbours are near."""
+    after = np.clip(np.searchsorted(t_s, grid), 1, len(t_s) - 1)
+    return (t_s[after] - t_s[after - 1] <= within_s) | np.isin(grid, t_s)

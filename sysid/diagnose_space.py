@@ -1,0 +1,285 @@
+"""Coordinates in which candidates are searched: one for every parameter.
+
+    linear      x = s u         zero is the identity
+    log         x = s eᵘ        factors, and parameters that only shape an effect
+    reciprocal  x = s / u       limits and cutoffs, which vanish at infinity: u = 0
+
+Sizes s come from what occurs in the records, so a heavy axis and a finger joint look
+alike, and a change of unit changes nothing.
+"""
+
+import itertools
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from envs.hand.effects.base import Parameter
+from envs.hand.effects.catalogue import CATALOGUE
+from sysid.diagnose_forced import joint_effects
+from sysid.diagnose_tracks import JointTrack
+from sysid.mechanism import Figure, JointDrive
+
+SKEW_S = 5e-4
+"""Age of the angle against the effort that is no news [s]."""
+
+DELAY_S = 1e-3
+"""Least deviation of a known delay that is news [s]."""
+
+MASS = 0.05
+"""Relative deviation of the modelled masses and inertias that is no news."""
+
+NUISANCE = ""
+Kind = Literal["linear", "log", "reciprocal"]
+
+
+@dataclass(frozen=True)
+class Slot:
+    """One coordinate.
+
+    Attributes:
+        effect, name: parameter; the effect is "" for what belongs to none.
+        unit: of the parameter.
+        kind, scale: how coordinate and parameter go together; see the module.
+        base: coordinate in the simulation as it stands.
+        low, high: range of the search.
+        tight: deviation that is no news; 0: fixed unless released; inf: free.
+        starts: coordinates from which a search begins.
+        vanishes: whether the effect is absent at `base`.
+    """
+
+    effect: str
+    name: str
+    unit: str
+    kind: Kind
+    scale: float
+    base: float
+    low: float
+    high: float
+    tight: float
+    starts: tuple[float, ...]
+    vanishes: bool
+
+    def value(self, u: Float[np.ndarray, "*c"]) -> Float[np.ndarray, "*c"]:
+        """Returns the parameter at a coordinate."""
+        if self.kind == "linear":
+            return self.scale * u
+        if self.kind == "log":
+            return self.scale * np.exp(u)
+        with np.errstate(divide="ignore"):
+            return self.scale / np.maximum(u, 0.0)
+
+    def coordinate(self, x: float) -> float:
+        """Returns the coordinate of a value."""
+        if self.kind == "linear":
+            return x / self.scale
+        if self.kind == "log":
+            return math.log(max(x, 1e-12) / self.scale)
+        return self.scale / x
+
+
+@dataclass(frozen=True)
+class Space:
+    """All coordinates of the candidates of one joint."""
+
+    slots: tuple[Slot, ...]
+
+    @property
+    def base(self) -> Float[np.ndarray, " n"]:
+        """The simulation as it stands."""
+        return np.array([s.base for s in self.slots])
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Effects in the order of the chain."""
+        return tuple(dict.fromkeys(s.effect for s in self.slots if s.effect))
+
+    def of(self, effect: str) -> list[int]:
+        """Indices of the coordinates of an effect."""
+        return [i for i, s in enumerate(self.slots) if s.effect == effect]
+
+    def nuisances(self) -> list[int]:
+        """Indices of the coordinates that every candidate may adjust."""
+        return [i for i, s in enumerate(self.slots) if s.tight > 0.0]
+
+    def deviations(self, released: Sequence[str]) -> Float[np.ndarray, " n"]:
+        """Prior deviations with some effects released; 0 for what stays fixed."""
+        return np.array(
+            [_FREE if s.effect in released else min(s.tight, _FREE) for s in self.slots]
+        )
+
+    def starts(self, effect: str) -> list[dict[int, float]]:
+        """Coordinates of an effect from which searches begin.
+
+        Sizes are tried one at a time, each with every shape.
+        """
+        indices = self.of(effect)
+        sizes = [i for i in indices if self.slots[i].kind != "log" or effect in _LOGS]
+        shapes = [i for i in indices if i not in sizes]
+        grids = [self.slots[i].starts for i in shapes]
+        return [
+            {i: u, **dict(zip(shapes, us, strict=True))}
+            for i in sizes
+            for u in self.slots[i].starts
+            for us in itertools.product(*grids)
+        ]
+
+    def values(self, theta: Float[np.ndarray, "c n"]) -> tuple[dict, dict]:
+        """Returns (parameters by effect, nuisances) of candidates."""
+        params: dict[str, dict] = {}
+        nuisance = {}
+        for column, slot in zip(theta.T, self.slots, strict=True):
+            x = slot.value(column).astype(np.float32)
+            if slot.effect:
+                params.setdefault(slot.effect, {})[slot.name] = x
+            else:
+                nuisance[slot.name] = x
+        nuisance.setdefault("push_gain", np.ones(len(theta), np.float32))
+        return params, nuisance
+
+    def local(self) -> list[int]:
+        """Indices of what belongs to a record and not to the mechanism."""
+        return [i for i, s in enumerate(self.slots) if s.name == "push_gain"]
+
+
+_FREE = 5.0
+_LOGS = ("stiffness", "damping", "encoder_scale")
+
+
+def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> Space:
+    """Makes the coordinates of one joint.
+
+    Args:
+        track: the records, for sizes.
+        drive: what the simulation has, and tolerances.
+        known: which surroundings are known, by field name.
+    """
+    slots = [
+        _pseudo("effort_gain", "1", "log", 1.0, drive.effort_scale.tolerance),
+        _pseudo("mass", "1", "log", 1.0, MASS),
+        _pseudo("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
+    ]
+    if np.any(np.asarray(track.track.ext)):
+        free = _pseudo("push_gain", "1", "linear", 1.0, math.inf)
+        slots.append(replace(free, base=1.0))
+    if drive.effort_scale.free:
+        slots[0] = replace(slots[0], tight=math.inf)
+    sizes = _sizes(track)
+    for effect in joint_effects():
+        kind = CATALOGUE[effect]
+        if all(known.get(name, False) for name in kind.needs):
+            figures = _figures(drive, effect, track)
+            for name, parameter in kind.parameters.items():
+                slots.append(_slot(effect, name, parameter, figures.get(name), sizes))
+    return Space(tuple(slots))
+
+
+def _pseudo(name: str, unit: str, kind: Kind, scale: float, tight: float) -> Slot:
+    return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, tight, (), False)
+
+
+def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Figure]:
+    """Returns what the simulation has of an effect."""
+    if effect == "stiffness":
+        return {"scale": replace(drive.kp, value=1.0)}
+    if effect == "damping":
+        return {"scale": replace(drive.kd, value=1.0)}
+    found = drive.effects.get(effect, {})
+    if effect == "armature" and not found:
+        mean = float(np.mean(np.asarray(track.track.inertia)))
+        return {"inertia_kgm2": Figure(0.0, MASS * mean)}
+    return found
+
+
+def _sizes(track: JointTrack) -> dict[str, float]:
+    """Returns a size that matters for every unit."""
+    torque, speed, angle = track.torque_scale, track.speed_scale, track.angle_scale
+    inertia = max(float(np.mean(np.asarray(track.track.inertia))), 1e-12)
+    return {
+        "N·m": torque,
+        "rad": 0.1 * angle,
+        "rad/s": speed,
+        "N·m·s/rad": torque / speed,
+        "kg·m²": inertia,
+        "N·m/s": torque / 0.03,
+        "1/(N·m)": 1.0 / torque,
+        "1/(N·m)²": 1.0 / torque**2,
+        "rad/(N·m)": 0.05 * angle / torque,
+        "N·m/rad": torque / angle,
+        "s": 0.02,
+    }
+
+
+_LINEAR = (0.1,)
+_STEPS = (0.004, 0.01, 0.025, 0.06, 0.15, 0.4)
+_RECIPROCAL = {"N·m": (1.0, 1.2, 1.6), "rad/s": (0.6, 0.9, 1.2, 1.8)}
+
+
+def _slot(
+    effect: str,
+    name: str,
+    parameter: Parameter,
+    figure: Figure | None,
+    sizes: dict[str, float],
+) -> Slot:
+    """Makes the coordinate of one parameter."""
+    prior, identity = parameter.prior, parameter.identity
+    size = sizes.get(parameter.unit)
+    if identity is None:  # a shape: any positive size
+        scale = prior.center
+        if size is not None and parameter.unit != "s":
+            scale = 0.1 * size
+        spread = math.log(prior.spread)
+        reach, some = 3.0 * spread + 2.0, 1.2 * spread
+        slot = Slot(effect, name, parameter.unit, "log", scale, 0.0, -reach, reach,
+                    0.0, (-some, 0.0, some), True)  # fmt: skip
+    elif math.isinf(identity):
+        scale = size if size is not None else prior.center
+        starts = _RECIPROCAL.get(parameter.unit, (0.1, 0.3, 1.0, 2.0))
+        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 50.0,
+                    0.0, starts, True)  # fmt: skip
+    elif identity == 1.0:
+        slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,
+                    (-0.3, 0.3), True)  # fmt: skip
+    else:
+        scale = size
+        if scale is None:
+            scale = prior.spread if prior.kind == "normal" else prior.center
+        signed = parameter.low < 0.0
+        grid = _STEPS if parameter.unit == "rad" else _LINEAR
+        if size is None:
+            grid = (0.5,)
+        starts = (0.1, -0.1) if signed else grid
+        low = -30.0 if signed else 0.0
+        slot = Slot(effect, name, parameter.unit, "linear", scale, 0.0, low, 30.0,
+                    0.0, starts, True)  # fmt: skip
+    return slot if figure is None else _known(slot, figure)
+
+
+def _known(slot: Slot, figure: Figure) -> Slot:
+    """Places a coordinate at the figure that the simulation has."""
+    absent = figure.value == 0.0 and slot.kind == "linear"
+    base = slot.coordinate(figure.value)
+    if slot.kind == "log":
+        tight = figure.tolerance
+    elif absent:
+        tight = figure.tolerance / slot.scale
+    else:
+        tight = figure.tolerance * abs(base)
+    if slot.unit == "s":
+        tight = max(tight, DELAY_S / slot.scale)
+    starts = slot.starts
+    if slot.kind != "log" and not absent:
+        starts = (0.5 * base, 0.8 * base, 1.25 * base, 2.0 * base)
+    low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
+    return replace(
+        slot,
+        base=base,
+        low=low,
+        tight=math.inf if figure.free else tight,
+        starts=starts,
+        vanishes=absent or slot.effect in ("stiffness", "damping"),
+    )

@@ -1,0 +1,241 @@
+"""From the records of a mechanism to the measured track of one of its joints."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from envs.errors import InputError, one_of
+from sysid.data import MeasuredLog
+from sysid.diagnose_bodies import bodies_along
+from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
+from sysid.diagnose_records import SMOOTH_STEPS, Piece, grid_step_s, pieces_of, smoothed
+from sysid.mechanism import Mechanism
+
+
+@dataclass(frozen=True, eq=False)
+class JointTrack:
+    """The track of one joint and where its residuals count.
+
+    Attributes:
+        joint: name.
+        track: for `forced_residuals`; pieces are padded to one length.
+        dt: step of the grid [s].
+        valid: where residual samples (m) of the pieces (p) count.
+        moving: where the joint is certainly not at rest (m, p).
+        rough: change of the effort between readings that the band does not hold, which
+            is what sampling can hide [N·m] (m, p).
+        log: record that a piece is from.
+        start_s: time at which a piece starts [s].
+        effort: whether the effort was logged, for every piece.
+        noise: white noise of angle [rad] and effort [N·m] per step of the grid.
+        friction_speed: speed below which the joint may be at rest.
+        torque_scale, speed_scale, angle_scale, acc_scale: sizes that occur.
+    """
+
+    joint: str
+    track: Track
+    dt: float
+    valid: Bool[np.ndarray, "m p"]
+    moving: Bool[np.ndarray, "m p"]
+    rough: Float[np.ndarray, "m p"]
+    log: Int[np.ndarray, " p"]
+    start_s: Float[np.ndarray, " p"]
+    effort: Bool[np.ndarray, " p"]
+    noise: tuple[float, float]
+    friction_speed: float
+    torque_scale: float
+    speed_scale: float
+    angle_scale: float
+    acc_scale: float
+
+
+def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointTrack]:
+    """Returns the tracks of all joints that are in the records.
+
+    Raises:
+        InputError: joints that the mechanism lacks, or no piece that is long enough.
+    """
+    joints = logs[0].header.joints
+    for log in logs:
+        if log.header.joints != joints:
+            found, valid = ", ".join(log.header.joints), ", ".join(joints)
+            raise InputError(log.source, "joints", found, f"as before: {valid}")
+        if log.header.mounting != "palm_fixed":
+            valid = "palm_fixed: a hand that walks is not diagnosed joint by joint"
+            raise InputError(log.source, "mounting", log.header.mounting, valid)
+    for joint in joints:
+        if joint not in mechanism.drives:
+            valid = one_of(mechanism.drives, joint)
+            raise InputError(logs[0].source, "joints", joint, valid)
+    step_s = grid_step_s(logs, joints)
+    efforts = {joint: mechanism.drives[joint].effort for joint in joints}
+    pieces = [
+        p for i, log in enumerate(logs) for p in pieces_of(log, i, efforts, step_s)
+    ]
+    if not pieces:
+        longest = max(float(np.ptp(log.t_s)) for log in logs)
+        valid = "at least 1.5 s of readings without a jump of the clock"
+        raise InputError(logs[0].source, "t", f"{longest:.3g} s in pieces", valid)
+    bodies = [bodies_along(mechanism, logs[p.log], p, joints) for p in pieces]
+    return [
+        _track(mechanism, logs, pieces, bodies, j, step_s) for j in range(len(joints))
+    ]
+
+
+def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
+    """Gathers one joint of all pieces."""
+    joint = logs[0].header.joints[j]
+    drive = mechanism.drives[joint]
+    steps = max(len(p.t_s) for p in pieces)
+    scale = drive.effort_scale.value
+
+    def stack(values):
+        padded = [np.pad(v, [(0, steps - len(v))] + [(0, 0)] * (v.ndim - 1), "edge")
+                  for v in values]  # fmt: skip
+        return np.stack(padded, 1)
+
+    efforts = [scale * p.effort[:, j] for p in pieces]
+    logged = np.array([not np.any(np.isnan(e)) for e in efforts])
+    slow = [smoothed(p.vel[:, j], BAND_STEPS) for p in pieces]
+    neighbour = _neighbour(mechanism.model, logs[0].header.joints, j)
+    nm = [np.nan_to_num(scale * p.effort) for p in pieces]
+    factor = [
+        logs[p.log].header.settings.get(drive.kp_setting, 1.0)
+        if drive.kp_setting
+        else 1.0
+        for p in pieces
+    ]
+    fields = dict(
+        cmd=stack([p.cmd[:, j] for p in pieces]),
+        pos=stack([p.pos[:, j] for p in pieces]),
+        vel=stack([p.vel[:, j] for p in pieces]),
+        acc=stack([p.acc[:, j] for p in pieces]),
+        slow_vel=stack(slow),
+        effort=stack([np.nan_to_num(e) for e in efforts]),
+        push=stack([b.push[:, j] for b in bodies]),
+        ext=stack([p.ext[:, j] for p in pieces]),
+        inertia=stack([b.inertia[:, j] for b in bodies]),
+        moment=stack([b.moment[:, j] for b in bodies]),
+        turned=stack([b.turned[:, j] for b in bodies]),
+        payload_moment=stack([b.payload_moment[:, j] for b in bodies]),
+        payload_shift=stack([b.payload_shift[:, j] for b in bodies]),
+        payload_inertia=stack([b.payload_inertia[:, j] for b in bodies]),
+        others_nm=stack([np.abs(e).sum(1) - np.abs(e[:, j]) for e in nm]),
+        other_q=stack([p.pos[:, neighbour] for p in pieces]),
+        other_nm=stack([e[:, neighbour] for e in nm]),
+        gravity=np.stack([b.gravity for b in bodies]),
+        payload_kg=np.array([b.payload_kg[j] for b in bodies]),
+        kp=drive.kp.value * np.array(factor),
+        kd=drive.kd.value * np.ones(len(pieces)),
+        measured=logged.astype(float),
+        noise=np.zeros(4),
+    )
+    rows = sample_rows(steps)
+    valid = np.stack([_valid(p, j, steps) for p in pieces], 1)[rows]
+    noise = _noise(logs, joint, drive, step_s)
+    torque = np.concatenate(
+        [e if ok else drive.kp.value * f * (p.cmd[:, j] - p.pos[:, j])
+         for e, ok, p, f in zip(efforts, logged, pieces, factor, strict=True)]
+    )  # fmt: skip
+    vel = np.concatenate(slow)
+    speed = float(np.percentile(np.abs(vel), 98))
+    loud = _band_noise(noise, step_s)
+    fields["noise"] = np.array(loud)
+    at_rest = max(4.0 * loud[1], 0.01 * speed, 1e-9)
+    return JointTrack(
+        joint=joint,
+        track=Track(**{k: jnp.asarray(v, jnp.float32) for k, v in fields.items()}),
+        dt=step_s,
+        valid=valid,
+        moving=np.abs(fields["slow_vel"])[rows] > at_rest,
+        rough=_hidden(fields, rows),
+        log=np.array([p.log for p in pieces]),
+        start_s=np.array([p.t_s[0] for p in pieces]),
+        effort=logged,
+        noise=noise,
+        friction_speed=at_rest,
+        torque_scale=max(float(np.percentile(np.abs(torque), 98)), 1e-9),
+        speed_scale=max(speed, 1e-9),
+        angle_scale=max(
+            float(np.ptp(np.concatenate([p.pos[:, j] for p in pieces]))), 1e-9
+        ),
+        acc_scale=max(
+            float(
+                np.percentile(np.abs(np.concatenate([p.acc[:, j] for p in pieces])), 98)
+            ),
+            1e-9,
+        ),
+    )
+
+
+def _neighbour(model, joints: tuple[str, ...], j: int) -> int:
+    """Returns the joint on the parent's body, else on a child's, else itself."""
+    body = [int(model.jnt_bodyid[model.joint(n).id]) for n in joints]
+    parents = [int(model.body_parentid[b]) for b in body]
+    for k, other in enumerate(body):
+        if other == parents[j]:
+            return k
+    for k, parent in enumerate(parents):
+        if parent == body[j]:
+            return k
+    return j
+
+
+def _hidden(track: dict, rows: np.ndarray) -> np.ndarray:
+    """Returns by how much the torque changes faster than the band, root mean square."""
+    error = track["cmd"] - track["pos"]
+    servo = track["kp"] * error - track["kd"] * track["vel"]
+    torque = np.where(track["measured"] > 0.0, track["effort"], servo)
+    fast = np.diff(torque, 2, axis=0, prepend=torque[:1], append=torque[-1:])
+    mean = [np.convolve(x, np.ones(9) / 9.0, "same") for x in (fast**2).T]
+    return np.sqrt(np.stack(mean, 1))[rows]
+
+
+def _valid(piece: Piece, j: int, steps: int) -> np.ndarray:
+    """Tells where samples of the residual rest on readings only."""
+    valid = np.zeros(steps, bool)
+    valid[: len(piece.t_s)] = piece.valid[:, j]
+    settle = int(0.4 / (piece.t_s[1] - piece.t_s[0])) + 8
+    bad = ~valid
+    bad[:settle] = True  # the past of the target is not known
+    spread = np.convolve(bad, np.ones(17), "same") > 0
+    return ~spread
+
+
+def _noise(logs, joint: str, drive, step_s: float) -> tuple[float, float]:
+    """Estimates the noise of angle and effort, as white noise of one step of the grid.
+
+    Fourth differences of the readings hold little else than noise.
+    """
+    found = []
+    for name in (f"pos.{joint}", f"{drive.effort}.{joint}"):
+        kept = [log.samples(name) for log in logs if name in log.columns]
+        rough = [_rough(t_s, x, step_s) for t_s, x in kept]
+        found.append(float(np.median(rough)) if rough else 0.0)
+    return found[0], found[1] * drive.effort_scale.value
+
+
+def _rough(t_s: np.ndarray, x: np.ndarray, step_s: float) -> float:
+    """Deviation of the noise of readings, scaled to a step of the grid."""
+    period = float(np.median(np.diff(t_s)))
+    d = np.abs(np.diff(x, 4)) / np.sqrt(70.0)
+    size = float(np.median(d)) / 0.6745
+    if size == 0.0:  # most readings repeat the last one: a coarse encoder
+        size = float(np.sqrt(np.mean(d**2)))
+    return size * np.sqrt(min(period / step_s, 1.0))
+
+
+def _band_noise(noise: tuple[float, float], step_s: float) -> tuple[float, ...]:
+    """Noise in the band of the residuals: angle, speed, acceleration, effort.
+
+    White noise through a Gaussian of width w and its derivatives has the variances
+    1 / 2√π w, 1 / 4√π w³ and 3 / 8√π w⁵ of one sample's.
+    """
+    w, root = np.hypot(BAND_STEPS, SMOOTH_STEPS), np.sqrt(np.pi)
+    angle = noise[0] * np.sqrt(0.5 / root / w)
+    speed = noise[0] * np.sqrt(0.25 / root / w**3) / step_s
+    acc = noise[0] * np.sqrt(0.375 / root / w**5) / step_s**2
+    return angle, speed, acc, noise[1] * np.sqrt(0.5 / root / w)

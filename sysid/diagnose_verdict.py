@@ -1,0 +1,297 @@
+"""From searches joint by joint to one verdict in words and numbers."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from envs.hand.effects.catalogue import CATALOGUE
+from sysid.diagnose_gain import residual_gains
+from sysid.diagnose_search import THRESHOLD, Model, Search, gain_nat
+from sysid.diagnose_space import Slot
+from sysid.diagnose_words import next_experiment, summary_of, warnings_of
+from sysid.diagnosis import Alternative, Cause, Estimate, Gain
+from sysid.mechanism import Mechanism
+
+WIDER = 2.0
+"""Factor by which intervals are wider than the fit says: its noise is not white."""
+
+SURE = 3.0
+"""Gap below which two effects cannot be told apart [nat]."""
+
+NEARLY = 0.03
+"""Share of a cause's gain below which a gap does not decide."""
+
+EXCESS = 1.5
+"""Error over the noise floor above which something is left to explain."""
+
+POOR = 0.5
+"""Share of what is removable that causes must remove to be more than a hint."""
+
+
+def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict:
+    """Returns the fields of a `Diagnosis` that the searches decide."""
+    searched = [e for e in examined if e.search is not None]
+    warnings = [
+        f"{e.track.joint} does not move in these records and was not examined"
+        for e in examined
+        if e.search is None
+    ]
+    if not searched:
+        return _fields("not_observable", warnings=warnings, blind=tuple(CATALOGUE))
+    gains = {e.track.joint: _gains_of(e, mechanism, seed) for e in searched}
+    causes = _causes(searched, mechanism)
+    warnings += [w for e in searched for w in warnings_of(e.search)]
+    blind = _blind(searched)
+    left = [text for e in searched for text in _left(e, gains[e.track.joint])]
+    first = _leading(searched, causes)
+    gain = _main(gains[first.track.joint]) if causes else None
+    rivals = _alternatives(first.search) if causes else ()
+    verdict = _word(causes, rivals, left, gain, searched, blind)
+    return _fields(
+        verdict,
+        causes=tuple(causes),
+        alternatives=rivals,
+        gain=gain,
+        residual_gains=gains[first.track.joint],
+        advice=next_experiment(verdict, causes, rivals, blind),
+        blind=blind,
+        left=tuple(left),
+        warnings=warnings,
+    )
+
+
+def _fields(verdict, causes=(), alternatives=(), gain=None, residual_gains=None,
+            advice="", blind=(), left=(), warnings=()):  # fmt: skip
+    """Names the fields of a `Diagnosis`."""
+    if verdict == "not_observable" and not advice:
+        advice = next_experiment(verdict, (), (), blind)
+    return {
+        "verdict": verdict,
+        "causes": tuple(causes),
+        "alternatives": tuple(alternatives),
+        "gain": gain,
+        "next_experiment": advice,
+        "residual_gains": residual_gains or {},
+        "not_observable": tuple(blind),
+        "unexplained": tuple(left),
+        "warnings": tuple(warnings),
+        "summary": summary_of(verdict, causes, alternatives, gain, blind, left),
+    }
+
+
+def _gains_of(examined, mechanism: Mechanism, seed: int) -> dict[str, Gain]:
+    linear = mechanism.is_slide(examined.track.joint)
+    torque = "N" if linear else "N·m"
+    units = {"position": "m" if linear else "rad", "controller": torque}
+    return residual_gains(examined.search, {**units, "mechanics": torque}, seed)
+
+
+def _word(causes, rivals, left, gain, searched, blind) -> str:
+    """Chooses the verdict."""
+    if causes:
+        if left and gain is not None and gain.explained_fraction < POOR:
+            return "unexplained"
+        same = any(not r.distinguishable for r in rivals)
+        return "ambiguous" if same else "found"
+    if left:
+        return "unexplained"
+    assumed = {
+        s.effect
+        for e in searched
+        for s in e.search.problem.space.slots
+        if s.kind == "reciprocal" and s.base > 0.0
+    }
+    candidates = len(searched[0].search.problem.space.effects)
+    dark = assumed.intersection(blind) or len(blind) > 0.6 * candidates
+    return "not_observable" if dark else "none"
+
+
+def _causes(searched, mechanism: Mechanism) -> list[Cause]:
+    """Joins the causes of all joints by effect, in order of gain."""
+    by_effect: dict[str, list] = {}
+    for e in searched:
+        for effect in e.search.best.effects:
+            by_effect.setdefault(effect, []).append(e)
+    causes = []
+    for effect, members in by_effect.items():
+        joints = tuple(e.track.joint for e in members)
+        for where, inside in _places(joints, mechanism, searched):
+            chosen = [e for e in members if e.track.joint in inside]
+            evidence = sum(_evidence(e.search, effect) for e in chosen)
+            causes.append(Cause(effect, where, _pooled(chosen, effect), evidence))
+    return sorted(causes, key=lambda c: -c.evidence)
+
+
+def _evidence(found: Search, effect: str) -> float:
+    """Gain of the best model over the one without the effect."""
+    best = found.best
+    without = found.without.get(effect, found.base)
+    return round(gain_nat(without.score, best.score, found.samples), 3)
+
+
+def _places(joints, mechanism: Mechanism, searched):
+    """Returns the class that the joints are, or each of them by its name."""
+    present = {e.track.joint for e in searched}
+    if len(present) == 1:
+        return [(joints[0], joints)]
+    if set(joints) == present and len(present) > 1:
+        return [("all", joints)]
+    for name, members in mechanism.classes.items():
+        inside = present.intersection(members)
+        if len(inside) > 1 and set(joints) == inside:
+            return [(name, joints)]
+    return [(joint, (joint,)) for joint in joints]
+
+
+def _pooled(members, effect: str) -> dict[str, Estimate]:
+    """Mean of the joints' estimates, with an interval that holds them all."""
+    each = [estimates(e.search, e.search.best, effect) for e in members]
+    pooled = {}
+    for name, one in each[0].items():
+        values = [x[name] for x in each]
+        pooled[name] = Estimate(
+            float(np.mean([v.value for v in values])),
+            min(v.low for v in values),
+            max(v.high for v in values),
+            one.unit,
+        )
+    return pooled
+
+
+def estimates(found: Search, model: Model, effect: str) -> dict[str, Estimate]:
+    """Returns the parameters of an effect with their 95 % intervals."""
+    space, fit = found.problem.space, model.fit
+    scale = max(1.0, model.score / max(found.samples, 1))
+    deviation = space.deviations(model.effects)[fit.free]
+    h = fit.jacobian.T @ fit.jacobian / scale + np.diag(1.0 / deviation**2)
+    from_fit = np.diag(np.linalg.pinv(h))
+    folds = len(model.fold_theta)
+    spread = (
+        (folds - 1)
+        / folds
+        * np.sum((model.fold_theta - model.fold_theta.mean(0)) ** 2, 0)
+    )
+    result = {}
+    for index in space.of(effect):
+        slot = space.slots[index]
+        k = int(np.flatnonzero(fit.free == index)[0])
+        sigma = np.sqrt(max(WIDER**2 * from_fit[k], spread[index]))
+        result[slot.name] = _interval(slot, fit.theta[index], 1.96 * sigma)
+    return result
+
+
+def _interval(slot: Slot, u: float, half: float) -> Estimate:
+    """Turns an interval of the coordinate into one of the parameter."""
+    ends = [float(slot.value(np.array(x))) for x in (u - half, u + half)]
+    value = float(slot.value(np.array(u)))
+    low, high = min(ends), max(ends)
+    if slot.kind == "linear" and slot.low == 0.0:
+        low = max(low, 0.0)
+    big = 1e9
+    return Estimate(min(value, big), min(low, big), min(high, big), slot.unit)
+
+
+def _leading(searched, causes):
+    """Returns the joint to which the first cause belongs."""
+    if not causes:
+        return searched[0]
+    effect = causes[0].effect
+    return max(
+        (e for e in searched if effect in e.search.best.effects),
+        key=lambda e: _evidence(e.search, effect),
+    )
+
+
+def _alternatives(found: Search) -> tuple[Alternative, ...]:
+    """Returns the rivals of the strongest cause.
+
+    A rival with more parameters that predicts no better is the cause itself in another
+    dress, as friction over a presliding range of nothing is dry friction.
+    """
+    cause = max(found.best.effects, key=lambda e: _evidence(found, e))
+    gain = _evidence(found, cause)
+    space, result = found.problem.space, []
+    for model in found.rivals.get(cause, []):
+        effect = next(e for e in model.effects if e not in found.best.effects)
+        gap = gain_nat(model.score, found.best.score, found.samples)
+        larger = len(space.of(effect)) > len(space.of(cause))
+        told = gap > max(SURE, NEARLY * gain) or (larger and gap > -SURE)
+        if np.isfinite(gap) and gap < 0.9 * gain:
+            result.append(Alternative(effect, round(gap, 3), bool(told)))
+    return tuple(sorted(result, key=lambda a: a.score_gap)[:8])
+
+
+def _blind(searched) -> tuple[str, ...]:
+    """Returns effects that no joint's records could show."""
+    sets = [set(blind_effects(e.search)) for e in searched]
+    common = set.intersection(*sets)
+    return tuple(name for name in CATALOGUE if name in common)
+
+
+def blind_effects(found: Search) -> list[str]:
+    """Returns effects whose smallest size that matters leaves no trace here."""
+    problem, model = found.problem, found.best
+    space = problem.space
+    names = [e for e in space.effects if e not in model.effects]
+    thetas, owners = [], []
+    for name in names:
+        for index in space.of(name):
+            slot = space.slots[index]
+            if slot.effect and (not slot.vanishes or slot.name not in _shapes(name)):
+                theta = model.fit.theta.copy()
+                theta[index] = _matters(slot)
+                thetas.append(theta)
+                owners.append(name)
+    rs = problem.residual(np.stack(thetas)) - model.fit.residual
+    deviation = space.deviations(model.effects)[model.fit.free]
+    j = np.concatenate([model.fit.jacobian, np.diag(1.0 / deviation)])
+    q, _ = np.linalg.qr(j)
+    full = np.concatenate([rs, np.zeros((len(rs), len(deviation)))], 1)
+    seen = np.sum(full**2, 1) - np.sum((full @ q) ** 2, 1)
+    scale = max(1.0, model.score / max(found.samples, 1))
+    best = {name: 0.0 for name in names}
+    for name, value in zip(owners, seen, strict=True):
+        best[name] = max(best[name], float(value) / scale)
+    return [name for name in names if best[name] < 2.0 * THRESHOLD]
+
+
+def _shapes(effect: str) -> set[str]:
+    """Parameters that only shape an effect."""
+    return {n for n, p in CATALOGUE[effect].parameters.items() if p.identity is None}
+
+
+def _matters(slot: Slot) -> float:
+    """Coordinate of the smallest size that would matter."""
+    if slot.kind == "reciprocal":
+        return 1.25 * slot.base if slot.base > 0.0 else 1.1
+    if slot.kind == "log":
+        return slot.base + 0.1
+    if slot.starts:
+        grid = [u for u in slot.starts if u > 0.0]
+        return slot.base + sorted(grid)[len(grid) // 2]
+    return slot.base + 0.1
+
+
+def _left(examined, gains: dict[str, Gain]) -> list[str]:
+    """Tells where an error remains that no effect explains."""
+    texts = []
+    for name in ("controller", "mechanics"):
+        gain = gains.get(name)
+        if gain is None or not gain.noise_floor:
+            continue
+        ratio = gain.heldout_rmse_after / gain.noise_floor
+        if ratio > EXCESS:
+            texts.append(
+                f"{examined.track.joint}: the {name} residual is {ratio:.1f} times the "
+                f"noise ({gain.heldout_rmse_after:.3g} {gain.unit})"
+            )
+    return texts
+
+
+def _main(gains: dict[str, Gain]) -> Gain:
+    """Chooses the gain to tell first: the angle's where it shows, else an effort's."""
+    position = gains.get("position")
+    if position is not None and position.explained_fraction > 0.0:
+        return position
+    return max(gains.values(), key=lambda g: g.explained_fraction)

@@ -1,0 +1,185 @@
+"""Maximum a-posteriori fits of many candidates side by side.
+
+    θ̂ = argmin ‖W r(θ)‖² + Σ ((θ_i − θ⁰_i) / σ_i)²
+
+by Levenberg-Marquardt steps. Candidates advance together, so that all their
+simulations of one round are one batch.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+Residual = Callable[[Float[np.ndarray, "c n"]], Float[np.ndarray, "c r"]]
+"""Coordinates of candidates -> their weighted residuals."""
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One fit.
+
+    Attributes:
+        start: first coordinates.
+        free: indices of those that may change.
+        center, deviation: of the prior, for all coordinates.
+        low, high: bounds, for all coordinates.
+    """
+
+    start: Float[np.ndarray, " n"]
+    free: Int[np.ndarray, " k"]
+    center: Float[np.ndarray, " n"]
+    deviation: Float[np.ndarray, " n"]
+    low: Float[np.ndarray, " n"]
+    high: Float[np.ndarray, " n"]
+
+    def penalty(self, theta: np.ndarray) -> float:
+        """Squared distance from the prior's center."""
+        k = self.free
+        return float(np.sum(((theta - self.center)[k] / self.deviation[k]) ** 2))
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """Where a fit ended.
+
+    Attributes:
+        theta: coordinates.
+        cost: ‖W r‖² with the penalty of the prior.
+        residual: W r.
+        jacobian: of W r by the free coordinates.
+        free: their indices.
+        bounded: free coordinates that ended at a bound.
+    """
+
+    theta: Float[np.ndarray, " n"]
+    cost: float
+    residual: Float[np.ndarray, " r"]
+    jacobian: Float[np.ndarray, "r k"]
+    free: Int[np.ndarray, " k"]
+    bounded: tuple[int, ...]
+
+
+STEP = 1e-2
+"""Step of the differences, in units of the coordinate or of its prior deviation."""
+
+_TRIED = (0.03, 30.0)
+"""Dampings that are tried, as multiples of the last one that helped."""
+
+
+def fit_all(
+    residual: Residual,
+    tasks: Sequence[Task],
+    rounds: int = 5,
+    exact: int = 8,
+    shared: dict[int, Float[np.ndarray, " r"]] | None = None,
+) -> list[Fit]:
+    """Advances all fits together.
+
+    Args:
+        residual: weighted residuals of many candidates.
+        tasks: the fits.
+        rounds: Levenberg-Marquardt steps.
+        exact: number of fits, the best, whose whole Jacobian is found at the end.
+        shared: columns of the Jacobian that are otherwise taken as they are.
+
+    Returns:
+        One result per task.
+    """
+    shared = shared or {}
+    states = [_State(task) for task in tasks]
+    for state, r in zip(
+        states, residual(np.stack([t.start for t in tasks])), strict=True
+    ):
+        state.enter(r)
+    for _ in range(rounds):
+        live = [s for s in states if not s.done]
+        if live:
+            _derive(residual, live, shared)
+            _advance(residual, live)
+    best = sorted(states, key=lambda s: s.cost)[:exact]
+    _derive(residual, best, {})
+    _derive(residual, [s for s in states if s not in best], shared)
+    return [state.result() for state in states]
+
+
+class _State:
+    """One fit on its way."""
+
+    def __init__(self, task: Task):
+        self.task, self.theta = task, np.clip(task.start, task.low, task.high)
+        self.cost, self.r = np.inf, np.zeros(0)
+        self.columns: dict[int, np.ndarray] = {}
+        self.damping, self.done = 1e-3, False
+
+    def enter(self, r: np.ndarray) -> None:
+        self.r = r
+        self.cost = float(r @ r) + self.task.penalty(self.theta)
+
+    def steps(self, index: int) -> float:
+        deviation = self.task.deviation[index]
+        step = STEP * min(1.0, max(deviation, 0.02) * 5.0)
+        above = self.theta[index] + step > self.task.high[index]
+        return -step if above else step
+
+    def proposals(self) -> list[np.ndarray]:
+        task, k = self.task, self.task.free
+        j = np.stack([self.columns[i] for i in k], 1)
+        weight = 1.0 / task.deviation[k] ** 2
+        h = j.T @ j + np.diag(weight)
+        g = j.T @ self.r + weight * (self.theta - task.center)[k]
+        result = []
+        for damping in (self.damping * x for x in _TRIED):
+            d = -np.linalg.solve(h + damping * np.diag(np.diag(h) + 1e-9), g)
+            d = np.clip(d, -2.0, 2.0)
+            theta = self.theta.copy()
+            theta[k] = np.clip(theta[k] + d, task.low[k], task.high[k])
+            result.append(theta)
+        return result
+
+    def choose(self, thetas: list[np.ndarray], rs: np.ndarray) -> None:
+        costs = [
+            float(r @ r) + self.task.penalty(t) for r, t in zip(rs, thetas, strict=True)
+        ]
+        costs = [c if np.isfinite(c) else np.inf for c in costs]
+        best = int(np.argmin(costs))
+        if costs[best] < self.cost:
+            self.done = self.cost - costs[best] < 1e-4 * self.cost + 1e-2
+            self.theta, self.r, self.cost = thetas[best], rs[best], costs[best]
+            self.damping = max(self.damping * _TRIED[best], 1e-7)
+        else:
+            self.done = self.damping > 1e3
+            self.damping *= 1e3
+
+    def result(self) -> Fit:
+        task, k = self.task, self.task.free
+        edge = [i for i in k if self.theta[i] in (task.low[i], task.high[i])]
+        j = np.stack([self.columns[i] for i in k], 1)
+        return Fit(self.theta, self.cost, self.r, j, k, tuple(edge))
+
+
+def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
+    """Finds the Jacobians by forward differences."""
+    rows, places = [], []
+    for state in live:
+        for i in state.task.free:
+            if i in shared:
+                state.columns[i] = shared[i]
+                continue
+            theta, step = state.theta.copy(), state.steps(i)
+            theta[i] += step
+            rows.append(theta)
+            places.append((state, i, step))
+    if rows:
+        for (state, i, step), r in zip(places, residual(np.stack(rows)), strict=True):
+            state.columns[i] = (r - state.r) / step
+
+
+def _advance(residual: Residual, live: list[_State]) -> None:
+    """Tries steps of two lengths and keeps the best."""
+    tried = [state.proposals() for state in live]
+    flat = residual(np.stack([t for thetas in tried for t in thetas]))
+    many = len(_TRIED)
+    for number, (state, thetas) in enumerate(zip(live, tried, strict=True)):
+        state.choose(thetas, flat[many * number : many * number + many])

@@ -1,0 +1,110 @@
+"""Grid, coordinates and folds of the diagnosis."""
+
+import numpy as np
+import pytest
+
+from envs.errors import InputError
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.quiet_mujoco import mujoco
+from sysid.data import make_log
+from sysid.diagnose import diagnose
+from sysid.diagnose_records import grid_step_s, pieces_of, smoothed
+from sysid.diagnose_space import make_space
+from sysid.diagnose_tracks import all_tracks
+from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
+
+STAND = """
+<mujoco><worldbody><body><joint name="knee" axis="0 1 0"/>
+<inertial pos="0 0 -0.1" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
+</body></worldbody></mujoco>"""
+
+
+def stand(**drive):
+    model = mujoco.MjModel.from_xml_string(STAND)
+    fields = {"kp": Figure(5.0), "kd": Figure(0.1, 0.1), **drive}
+    return model_mechanism(model, {"knee": JointDrive(**fields)})
+
+
+def log_of(t_s, cmd, pos, **columns):
+    named = {"cmd.knee": cmd, "pos.knee": pos}
+    named |= {f"{k}.knee": v for k, v in columns.items()}
+    return make_log(("knee",), t_s, named)
+
+
+def test_smoothing_keeps_lines_and_derives_waves():
+    x = np.arange(400.0)
+    assert smoothed(3.0 - 0.5 * x, 2.0) == pytest.approx(3.0 - 0.5 * x, abs=1e-9)
+    assert smoothed(0.5 * x, 2.0, 1) == pytest.approx(0.5, abs=1e-9)
+    w = 2.0 * np.pi / 40.0
+    gain = np.exp(-0.5 * (2.0 * w) ** 2)
+    slope = smoothed(np.sin(w * x), 2.0, 1)[100:300]
+    assert slope == pytest.approx(gain * w * np.cos(w * x)[100:300], abs=1e-4)
+
+
+def test_pieces_end_where_the_clock_jumps():
+    t_s = np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(4.5, 7.0, 0.005)])
+    log = log_of(t_s, np.sin(t_s), np.sin(t_s))
+    step = grid_step_s([log], ["knee"])
+    first, second = pieces_of(log, 0, {"knee": "tau"}, step)
+    assert first.t_s[-1] < 4.0 < second.t_s[0]
+    assert second.pos[10:-10, 0] == pytest.approx(np.sin(second.t_s)[10:-10], abs=1e-4)
+    assert second.vel[20:-20, 0] == pytest.approx(np.cos(second.t_s)[20:-20], abs=1e-3)
+    assert np.all(np.isnan(first.effort))
+
+
+def test_gravity_of_the_stand():
+    """m (a × r) · g = −m g l sin q for a weight that hangs."""
+    t_s = np.arange(0.0, 4.0, 0.005)
+    q = 0.5 * np.sin(t_s)
+    track = all_tracks([log_of(t_s, q, q)], stand())[0].track
+    torque = np.sum(np.asarray(track.moment) * np.asarray(track.gravity), -1)[:, 0]
+    expected = -0.2 * 9.81 * 0.1 * np.sin(np.asarray(track.pos)[:, 0])
+    assert torque == pytest.approx(expected, abs=1e-5)
+    assert np.asarray(track.inertia) == pytest.approx(2e-3 + 1e-4, rel=1e-4)
+
+
+def test_coordinates_and_identity():
+    """At the base every effect of the stand vanishes, and values come back."""
+    t_s = np.arange(0.0, 4.0, 0.005)
+    q = 0.5 * np.sin(t_s)
+    mechanism = stand(effects={"slew_limit": {"speed_rad_s": Figure(3.0)}})
+    track = all_tracks([log_of(t_s, q, q)], mechanism)[0]
+    space = make_space(track, mechanism.drives["knee"], {"others_nm": True})
+    params, _ = space.values(space.base[None])
+    for effect in space.effects:
+        for name, value in CATALOGUE[effect].identity().items():
+            if CATALOGUE[effect].parameters[name].identity is not None:
+                expected = 3.0 if effect == "slew_limit" else value
+                assert params[effect][name][0] == pytest.approx(expected)
+    for slot in space.slots:
+        for u in slot.starts:
+            value = float(slot.value(np.array(u)))
+            assert slot.coordinate(value) == pytest.approx(u, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("change", "match"),
+    [
+        ({"t_s": np.arange(20) * 0.005}, "1.5 s"),
+        ({"t_s": np.random.default_rng(1).permutation(600) * 0.005}, "into the past"),
+    ],
+)
+def test_records_that_are_refused(change, match):
+    t_s = change["t_s"]
+    with pytest.raises(InputError, match=match):
+        diagnose([log_of(t_s, np.sin(t_s), np.sin(t_s))], stand())
+
+
+def test_joints_that_the_mechanism_lacks():
+    t_s = np.arange(0.0, 4.0, 0.005)
+    with pytest.raises(InputError, match="knee"):
+        diagnose([log_of(t_s, np.sin(t_s), np.sin(t_s))], hand_mechanism())
+
+
+def test_a_joint_that_stands():
+    t_s = np.arange(0.0, 4.0, 0.005)
+    found = diagnose([log_of(t_s, 0.0 * t_s, 0.0 * t_s)], stand())
+    assert found.verdict == "not_observable"
+    assert not found.causes
+    assert "coulomb_friction" in found.not_observable
+    assert found.next_experiment
