@@ -63,7 +63,7 @@ HOVER_M = 0.004
 """Gap between fingertip and keys while nothing is asked; ours."""
 
 INPUTS = (
-    InputTerm("request", len(ARROWS), "key", "1", ((0.0, 1.0),) * len(ARROWS)),
+    InputTerm("request", len(ARROWS), "key", "1"),
     InputTerm("fingertip_pos", 3, "V", "m"),
 )
 

@@ -21,7 +21,7 @@ class InputTerm:
         size: entries of one sample.
         frame: frame in which they are expressed.
         unit: their unit.
-        ranges: lowest and highest value of each entry in training, for a term that an
+        ranges: lowest and highest value of each entry in training, for a command that an
             operator gives; empty for one that is measured.
     """
 
