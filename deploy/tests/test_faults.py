@@ -4,13 +4,15 @@ import numpy as np
 import pytest
 from fault_lab import Lab, snapshots
 from fault_links import LOSSES, burst, measure_loss
-from fault_processes import SIGNALS, WITHIN_S, kill_one
+from fault_processes import SIGNALS, WITHIN_S, kill_one, plain_options
 from fault_scenarios import SCENARIOS
 from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
 from hand_files import WALKING
 
 from fingers_deploy import load_bundle
+from fingers_deploy.drivers.sim import SimulatorProcess
+from fingers_deploy.runtime.launcher import EXIT_TRIP, Launcher
 from fingers_deploy.safety import ROWS, Mode
 
 SEED = 500
@@ -130,6 +132,21 @@ def test_processes_that_die(hand_model, marching_dir, name):
     for seed in range(5):
         death = kill_one(hand_model, marching_dir, name, seed)
         assert death.safe and death.reaction_s <= WITHIN_S[name.split()[0]]
+
+
+def test_a_supervisor_that_ends_by_an_error_of_its_own_leaves_a_safe_hand(
+    hand_model, marching_dir
+):
+    interface = load_bundle(marching_dir).manifest.interface
+    lines = []
+    with SimulatorProcess(hand_model, interface, lifetime_s=60.0) as simulator:
+        options = plain_options(marching_dir, simulator.path, None, wiggle=["joint"])
+        launcher = Launcher(options, lines.append)
+        while launcher.poll(0.2):
+            launcher.send("arm")
+        assert launcher.finish() == EXIT_TRIP
+    assert "the supervisor died (an error of its own)" in lines
+    assert lines[-1] == "guard: de-energized, confirmed"
 
 
 def test_a_supervisor_that_is_killed_leaves_a_safe_hand(hand_model, marching_dir):

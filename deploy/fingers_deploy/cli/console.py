@@ -14,6 +14,7 @@ from fingers_deploy.runtime.launcher import EXIT_PREFLIGHT, Launcher
 HELP = "type: arm, stop, clear, policy N, status, quit"
 REFUSED = 2  # exit status of a process that refuses its input
 _RETRY_S = 0.5
+_LONGEST = 4096  # characters of input that are taken at once
 _ARM_WITHIN_S = 15.0
 
 
@@ -55,7 +56,7 @@ class Console:
         self._start_s = self._asked_s = time.monotonic()
         self._duration_s = duration_s
         self._armed = self._quitting = self._helped = False
-        self._input_open = True
+        self._input_open, self._rest = True, b""
 
     def run(self) -> int:
         """Serves the operator until the run is over; returns the exit status."""
@@ -102,23 +103,27 @@ class Console:
             self._launcher.send("quit")
 
     def _read_input(self) -> None:
+        """Takes whole lines, without ever waiting for the rest of one."""
         if not self._input_open or not select.select([sys.stdin], [], [], 0)[0]:
             return
-        line = sys.stdin.readline()
-        if not line:
+        data = os.read(sys.stdin.fileno(), _LONGEST)
+        if not data:
             self._input_open = False
             if sys.stdin.isatty():
                 self._quit()
             return
-        word = " ".join(line.split())
+        *lines, self._rest = (self._rest + data).split(b"\n")
+        self._rest = self._rest[-_LONGEST:]
+        for line in lines:
+            self._act(" ".join(line.decode("utf-8", "replace").split()))
+
+    def _act(self, word: str) -> None:
         if word == "status":
             self._report()
         elif word == "quit":
             self._quit()
         elif word in ("arm", "stop", "clear") or _selects(word):
             self._launcher.send(word)
-            if word == "arm":
-                time.sleep(0.1)
         elif word:
             _say(HELP)
 

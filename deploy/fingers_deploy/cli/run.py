@@ -13,7 +13,7 @@ from fingers_deploy.drivers.open import KINDS, open_driver
 from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
-from fingers_deploy.runtime.guard import make_safe
+from fingers_deploy.runtime.guard import guard_hand
 
 WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
 
@@ -109,14 +109,9 @@ def _tell_distance(socket: str, interface: Interface) -> None:
 def guard(options: argparse.Namespace) -> int:
     """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
     interface = load_bundle(options.bundles[0]).manifest.interface
-    try:
-        driver = open_driver(_driver(options), interface)
-    except OSError as error:
-        print(f"no hand: {error}")
-        return 5
-    safe = make_safe(driver)
-    driver.close()
-    print("de-energized, confirmed" if safe else "NOT CONFIRMED: CUT THE BATTERY")
+    _check_library(options.driver)
+    safe, words = guard_hand(lambda: open_driver(_driver(options), interface))
+    print(words)
     return 0 if safe else 5
 
 
@@ -188,9 +183,7 @@ def _check(options: argparse.Namespace) -> None:
     if options.arm and kind == "wuji" and not options.dry_run:
         valid = "typing arm at the console"
         raise InputError("--arm", "", "a real hand", valid)
-    if kind == "wuji" and importlib.util.find_spec("wujihandpy") is None:
-        valid = "pip install wujihandpy, or the extra [hand]"
-        raise InputError("--driver wuji", "", "no wujihandpy", valid)
+    _check_library(kind)
     if not 50.0 <= options.loop_hz <= 1000.0:
         raise InputError("--loop-hz", "", options.loop_hz, "50 to 1000")
     if not all(abs(stick) <= 1.0 for stick in options.sticks):
@@ -202,3 +195,9 @@ def _check(options: argparse.Namespace) -> None:
         raise InputError("--duration", "", options.duration, "above 0 s")
     if not options.no_record and not Path(options.out).is_dir():
         raise InputError("--out", "", options.out, "an existing folder")
+
+
+def _check_library(kind: str) -> None:
+    if kind == "wuji" and importlib.util.find_spec("wujihandpy") is None:
+        valid = "pip install wujihandpy, or the extra [hand]"
+        raise InputError("--driver wuji", "", "no wujihandpy", valid)

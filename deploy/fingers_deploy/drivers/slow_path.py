@@ -2,6 +2,7 @@
 
 import threading
 import time
+from collections import deque
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,8 @@ class SlowPath:
     def __init__(self, hand: Any):
         self._hand = hand
         self._wake = threading.Event()
-        self._wanted: bool | None = None
+        # The newest request at the end; taken and added without ever losing one.
+        self._wanted: deque[bool] = deque(maxlen=1)
         self._confirmed: bool | None = False  # the driver has just de-energized it
         self._health: Health | None = None
         self._error: Exception | None = None
@@ -46,7 +48,7 @@ class SlowPath:
 
     def ask_enabled(self, enabled: bool) -> None:
         """Asks for power on or off; returns at once."""
-        self._wanted = enabled
+        self._wanted.append(enabled)
         self._wake.set()
 
     def close(self) -> None:
@@ -58,7 +60,7 @@ class SlowPath:
 
     def _run(self) -> None:
         due = time.monotonic()
-        while self._open or self._wanted is not None:
+        while self._open or self._wanted:
             try:
                 self._switch()
                 if time.monotonic() >= due and self._error is None:
@@ -73,8 +75,10 @@ class SlowPath:
             self._wake.clear()
 
     def _switch(self) -> None:
-        wanted, self._wanted = self._wanted, None
-        if wanted is None or (wanted and self._error is not None):
+        if not self._wanted:
+            return
+        wanted = self._wanted.pop()
+        if wanted and self._error is not None:
             return
         self._confirmed = None
         self._hand.write_joint_enabled(wanted, timeout=TIMEOUT_S)

@@ -32,7 +32,7 @@ from fingers_deploy.record.row import (
     schema_text,
 )
 
-MAX_FILE_BYTES = 50 * 2**20
+MAX_FILE_BYTES = 49_000_000  # what is left to write then makes it no 50 MB
 _MAX_WAITING = 5000
 _FLUSH_S = 1.0
 _STRING = "string data\n"
@@ -41,8 +41,8 @@ _STRING = "string data\n"
 class Recorder:
     """Writes rows and events to `<stem>-000.mcap`, `<stem>-001.mcap`, ….
 
-    A new file begins after 50 MiB. Rows that the disk cannot take in time, or at all,
-    are dropped and counted: the loop goes on.
+    A new file begins before 50 MB (10⁶ bytes) are reached. Rows that the disk cannot
+    take in time, or at all, are dropped and counted: the loop goes on.
 
     Args:
         folder: an existing folder.

@@ -24,7 +24,7 @@ class ConsoleLink:
         self.selected: int | None = None
 
     def poll(self) -> Operator:
-        """Returns the newest action.
+        """Returns the newest action; a stop outlasts whatever was typed after it.
 
         A console that is gone counts as an operator who wants to stop and quit.
         """
@@ -45,7 +45,8 @@ class ConsoleLink:
             elif word.startswith("policy ") and word[7:].isdigit():
                 self.selected = int(word[7:])
             else:
-                action = ACTIONS.get(word, action)
+                asked = ACTIONS.get(word, action)
+                action = action if action == Operator.STOP else asked
 
     def tell(self, status: dict[str, Any]) -> None:
         """Sends a status; one for which there is no room is lost."""

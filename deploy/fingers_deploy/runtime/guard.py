@@ -9,6 +9,24 @@ TRIES = 4
 CONFIRM_S = 0.5
 
 
+def guard_hand(open_hand: Callable[[], Driver]) -> tuple[bool, str]:
+    """Opens a hand, de-energizes it, lets go of it.
+
+    Returns:
+        Whether the hand confirmed that it is de-energized, and that in words.
+    """
+    try:
+        driver = open_hand()
+        safe = make_safe(driver)
+        driver.close()
+    except Exception as error:
+        # Whatever a driver raises: nobody else is left to sound the alarm.
+        return False, f"{type(error).__name__}: {error}: CUT THE BATTERY"
+    if not safe:
+        return False, "NOT CONFIRMED: CUT THE BATTERY"
+    return True, "de-energized, confirmed"
+
+
 def make_safe(
     driver: Driver,
     now: Callable[[], float] = time.monotonic,

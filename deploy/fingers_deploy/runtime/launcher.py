@@ -17,14 +17,14 @@ from typing import Any
 
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.drivers.open import open_driver
-from fingers_deploy.errors import InputError
-from fingers_deploy.runtime.guard import make_safe
+from fingers_deploy.runtime.guard import guard_hand
 from fingers_deploy.runtime.link import make_link
 
 SILENCE_S = 1.0
 START_S = 30.0
 FINISH_S = 6.0  # settling, and the hand's confirmation
-EXIT_TRIP, EXIT_PREFLIGHT = 5, 6
+LAST_S = 20.0  # that, the guard, and the end of the policy's process
+EXIT_CRASH, EXIT_TRIP, EXIT_PREFLIGHT = 1, 5, 6
 
 
 class Launcher:
@@ -37,6 +37,8 @@ class Launcher:
 
     def __init__(self, options: Mapping[str, Any], say: Callable[[str], None]):
         self._options, self._say = options, say
+        # Read now: when the guard needs it, the file may be gone.
+        self._interface = load_bundle(options["bundles"][0]).manifest.interface
         self.status: dict[str, Any] = {}
         supervisor, policy = make_link()
         self._console, console = make_link()
@@ -80,13 +82,17 @@ class Launcher:
         Where the supervisor did not end by itself, the guard de-energizes the hand.
         """
         self._console.close()
+        if self._notify:
+            # Longer than everything that follows; no status comes any more.
+            notify(self._notify, f"WATCHDOG_USEC={round(1e6 * LAST_S)}\nWATCHDOG=1")
         try:
             status = self.supervisor.wait(timeout=FINISH_S)
         except subprocess.TimeoutExpired:
             self.supervisor.kill()
             status = self.supervisor.wait()
-        if status < 0:
-            self._say(f"the supervisor died ({signal.Signals(-status).name})")
+        if status < 0 or status == EXIT_CRASH:
+            why = signal.Signals(-status).name if status < 0 else "an error of its own"
+            self._say(f"the supervisor died ({why})")
             self._guard()
             status = EXIT_TRIP
         try:
@@ -97,9 +103,12 @@ class Launcher:
         return policy if status == 0 and policy == 2 else status
 
     def _take(self, status: dict[str, Any]) -> None:
-        self._heard_s, self.status = time.monotonic(), status
+        before, self.status = self.status, status
+        self._heard_s = time.monotonic()
         for line in status["events"]:
             self._say(line)
+        if status["recording_error"] and not before.get("recording_error"):
+            self._say(f"NOT RECORDING: {status['recording_error']}; the run goes on")
         if status["timing_warning"] and not self._late:
             self._say(
                 "NOT ON TIME: more than 1 % of the control steps of the last 10 s were "
@@ -113,16 +122,9 @@ class Launcher:
             notify(self._notify, "READY=1\nWATCHDOG=1")
 
     def _guard(self) -> None:
-        driver_options = self._options["driver"]
-        try:
-            interface = load_bundle(self._options["bundles"][0]).manifest.interface
-            driver = open_driver(driver_options, interface)
-        except (InputError, OSError) as error:
-            self._say(f"guard: {error}: CUT THE BATTERY")
-            return
-        safe = make_safe(driver)
-        driver.close()
-        words = "de-energized, confirmed" if safe else "NOT CONFIRMED: CUT THE BATTERY"
+        _, words = guard_hand(
+            lambda: open_driver(self._options["driver"], self._interface)
+        )
         self._say(f"guard: {words}")
 
 

@@ -108,10 +108,12 @@ def decode_answer(data: bytes) -> Answer:
     packet = np.frombuffer(data, ANSWER)[0]
     fault, joints = int(packet["fault"]), int(packet["joints"])
     known = fault in PolicyFault.__members__.values()
+    # A number of joints that no packet can hold stands for none.
+    count = joints if 0 <= joints <= JOINT_COUNT else 0
     proposal = Proposal(
         tick=int(packet["tick"]),
         response=int(packet["response"]),
-        target_rad=packet["target"][: max(joints, 0)],
+        target_rad=packet["target"][:count],
         command_age_s=float(packet["command_age_s"]),
         fault=PolicyFault(fault) if known else PolicyFault.OUTPUT,
     )

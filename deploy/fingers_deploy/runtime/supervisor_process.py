@@ -184,13 +184,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ignore_interrupts()
     links = [socket.socket(fileno=int(handle)) for handle in (policy, console)]
     try:
-        return Supervisor(json.loads(text), *links).run()
+        supervisor = Supervisor(json.loads(text), *links)
     except InputError as error:
         print(error, file=sys.stderr)
         return 2
     except OSError as error:
         print(f"driver: {error}", file=sys.stderr)
         return 6
+    # What this raises is nobody's input: status 1, and the console's guard takes over.
+    return supervisor.run()
 
 
 if __name__ == "__main__":

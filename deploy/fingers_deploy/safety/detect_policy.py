@@ -2,7 +2,9 @@
 
 The lease: every control step issues a challenge, and only its complement renews the
 lease, from the time at which that challenge was issued. A wrong or old answer renews
-nothing. (Spot's E-stop works the same way.)
+nothing (Spot's E-stop works the same way), and neither does a second answer to the same
+challenge. Targets pass only with an answer that renews: once per control step, however
+often the policy answers.
 """
 
 import math
@@ -29,15 +31,20 @@ class LeaseMemory:
 
     Attributes:
         challenge: the newest challenge.
-        issued: the challenges that may be answered, and when each was issued [s].
+        issued: the challenges that may be answered, when each was issued [s], and for
+            which control step.
         renewed_s: issue time of the newest challenge that was answered rightly [s].
         tick: control step up to which the targets on the wire have followed.
+        answered: control step of that challenge.
+        fresh: it was answered now.
     """
 
     challenge: int = 0x9E3779B97F4A7C15
-    issued: tuple[tuple[int, float], ...] = ()
+    issued: tuple[tuple[int, float, int], ...] = ()
     renewed_s: float = -np.inf
     tick: int = -1
+    answered: int = -1
+    fresh: bool = False
 
 
 def complement(challenge: int) -> int:
@@ -48,16 +55,20 @@ def complement(challenge: int) -> int:
 def renew_lease(memory: LeaseMemory, inputs: Inputs, t: float) -> LeaseMemory:
     """Takes an answer, and issues the next challenge where a control step begins."""
     challenge, issued, renewed = memory.challenge, memory.issued, memory.renewed_s
-    proposal = inputs.proposal
+    proposal, answered, fresh = inputs.proposal, memory.answered, False
     if proposal is not None:
-        answered = proposal.response ^ _MASK
-        times = [when for number, when in issued if number == answered]
-        renewed = max([renewed, *times])
+        asked = proposal.response ^ _MASK
+        place = next((k for k, x in enumerate(issued) if x[0] == asked), None)
+        if place is not None:
+            _, renewed, answered = issued[place]
+            fresh = True
+            # This one and those before it are used up.
+            issued = issued[place + 1 :]
     if inputs.control_tick >= 0:
         # A linear congruential generator (Knuth's MMIX): never the same twice.
         challenge = (challenge * 6364136223846793005 + 1442695040888963407) & _MASK
-        issued = (*issued[1 - _KEPT :], (challenge, t))
-    return LeaseMemory(challenge, issued, renewed, memory.tick)
+        issued = (*issued[1 - _KEPT :], (challenge, t, inputs.control_tick))
+    return LeaseMemory(challenge, issued, renewed, memory.tick, answered, fresh)
 
 
 def detect_policy(
@@ -71,7 +82,8 @@ def detect_policy(
         found["S11"] = f"lease {_age(t - memory.renewed_s)}"
     proposal = inputs.proposal
     if proposal is not None:
-        if proposal.command_age_s > limits.command_s:
+        # Written so that NaN counts as lost.
+        if not proposal.command_age_s <= limits.command_s:
             found["S10"] = f"command {proposal.command_age_s:.2f} s old"
         _check_target(memory, proposal, target_rad, limits, found)
     return found
@@ -81,7 +93,8 @@ def steps_behind(change_rad: Array, limits: Limits) -> int:
     """Control steps of motion left over after one step of α toward a proposal.
 
     A late policy answers twice at once; what the first answer asked for comes in the
-    second one, and the targets catch up over the next steps.
+    second one, and the targets catch up in the next steps of the loop. So there is one
+    step of α per control step, never more.
     """
     farthest = float(np.abs(change_rad).max()) - limits.step_tolerance_rad
     return max(math.ceil(farthest / limits.step_rad) - 1, 0)
@@ -98,7 +111,10 @@ def _check_target(
     if proposed.shape != (JOINT_COUNT,):
         found["S18"] = f"proposal of {proposed.size} joints"
         return
-    steps = min(max(proposal.tick - memory.tick, 1), _MAX_STEPS)
+    # An answer that renews nothing moves nothing, wherever it is.
+    steps = math.inf
+    if memory.fresh:
+        steps = min(max(memory.answered - memory.tick, 1), _MAX_STEPS)
     step = np.abs(proposed - target_rad).max()
     low, high = limits.trained_rad[:, 0], limits.trained_rad[:, 1]
     beyond = np.maximum(low - proposed, proposed - high).max()

@@ -33,6 +33,7 @@ from fingers_deploy.safety.detect_sensors import (
 )
 from fingers_deploy.safety.latch import Fault, latch, severest
 from fingers_deploy.safety.limits import Limits
+from fingers_deploy.safety.motion import toward
 from fingers_deploy.safety.stopping import Stop, start_stop, step_stop
 from fingers_deploy.safety.types import Inputs, Mode, Operator, Outputs, Reaction
 
@@ -76,6 +77,7 @@ class State:
         t_s: time of the step before [s]; None before the first.
         target_rad: the targets on the wire; while de-energized the measured pose, [20].
         pose_rad: last valid measured pose, [20].
+        goal_rad: newest targets of the policy that may pass, [20]; None in other modes.
         faults: the latched faults.
         sensors, joints, lease, tilt_since_s: memories of the detectors.
         arming: where arming stands; None in other modes.
@@ -90,6 +92,7 @@ class State:
     t_s: float | None
     target_rad: Array
     pose_rad: Array
+    goal_rad: Array | None = None
     faults: tuple[Fault, ...] = ()
     sensors: SensorMemory = field(default_factory=SensorMemory)
     joints: JointMemory = field(default_factory=JointMemory)
@@ -136,7 +139,7 @@ def step(
         state = _enter(state, after, t, limits)
     elif inputs.operator in (Operator.ARM, Operator.CLEAR):
         lines += (_refusal(state, inputs, found),)
-    state = _targets(state, inputs, found, limits)
+    state = _targets(state, inputs, limits)
     return _finish(state, inputs, t, limits, lines)
 
 
@@ -231,22 +234,24 @@ def _enter(state: State, mode: Mode, t: float, limits: Limits) -> State:
     return dataclasses.replace(state, **changes)
 
 
-def _targets(
-    state: State, inputs: Inputs, found: dict[str, str], limits: Limits
-) -> State:
+def _targets(state: State, inputs: Inputs, limits: Limits) -> State:
     """Passes the policy's target, or follows the measured pose while de-energized."""
     if state.mode not in ENERGIZED:
-        return dataclasses.replace(state, target_rad=state.pose_rad)
-    proposal = inputs.proposal
-    if state.mode != Mode.ACTIVE or proposal is None or found.keys() & {"S4", "S18"}:
+        return dataclasses.replace(state, target_rad=state.pose_rad, goal_rad=None)
+    if state.mode != Mode.ACTIVE:
+        return dataclasses.replace(state, goal_rad=None)
+    lease, goal = state.lease, state.goal_rad
+    if lease.fresh and inputs.proposal is not None:
+        low, high = limits.allowed_rad[:, 0], limits.allowed_rad[:, 1]
+        goal = np.clip(inputs.proposal.target_rad, low, high)
+    if goal is None or not (lease.fresh or lease.tick < lease.answered):
         return state
-    low, high = limits.allowed_rad[:, 0], limits.allowed_rad[:, 1]
-    change = proposal.target_rad - state.target_rad
-    target = state.target_rad + np.clip(change, -limits.step_rad, limits.step_rad)
-    tick = proposal.tick - steps_behind(change, limits)
-    lease = dataclasses.replace(state.lease, tick=tick)
+    tick = lease.answered - steps_behind(goal - state.target_rad, limits)
     return dataclasses.replace(
-        state, target_rad=np.clip(target, low, high), lease=lease
+        state,
+        target_rad=toward(state.target_rad, goal, limits.step_rad),
+        goal_rad=goal,
+        lease=dataclasses.replace(lease, tick=tick),
     )
 
 

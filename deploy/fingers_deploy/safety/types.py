@@ -59,7 +59,7 @@ class Proposal:
     """The policy's answer to one observation.
 
     Attributes:
-        tick: number of the control step that it answers.
+        tick: number of the control step that it answers, for the log.
         response: complement of that step's challenge.
         target_rad: proposed joint targets; of any length, as received.
         command_age_s: age of the command source's newest frame [s].

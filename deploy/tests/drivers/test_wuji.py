@@ -167,6 +167,19 @@ def test_closing_de_energizes_and_may_be_repeated(library, interface):
     assert not library.DEVICE.enabled.any() and imu.closed
 
 
+def test_the_last_request_for_power_is_never_lost(library, driver):
+    """Also while the thread that serves requests is about to look for the next one."""
+    library.DEVICE.slow_s = 0.0
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        for _ in range(int(rng.integers(1, 200))):
+            driver.enable()
+        driver.disable()
+        assert _wait(lambda: not driver._slow._wanted, 2.0)
+        assert _wait(lambda: driver.health() and driver.health().disabled, 2.0)
+        assert not library.DEVICE.enabled.any()
+
+
 def test_the_guard_confirms_or_says_so(library, interface):
     driver = WujiDriver(library, interface, StillImu())
     library.DEVICE.enabled[:] = True

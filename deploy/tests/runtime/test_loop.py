@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fingers_deploy.runtime.console import ConsoleLink
+from fingers_deploy.runtime.guard import guard_hand
 from fingers_deploy.runtime.launcher import notify
 from fingers_deploy.runtime.link import (
     ANSWER,
@@ -154,6 +155,31 @@ def test_console_actions_and_its_loss():
     assert right.recv(100) == b'{"mode": "active"}'
     right.close()
     assert console.poll() == Operator.STOP and console.quitting
+
+
+@pytest.mark.parametrize("later", ["clear", "arm", "status"])
+def test_a_stop_outlasts_what_is_typed_after_it(later):
+    left, right = make_link()
+    console = ConsoleLink(left)
+    for word in ("arm", "stop", later):
+        right.send(word.encode())
+    assert console.poll() == Operator.STOP
+
+
+def test_an_impossible_number_of_joints_is_none():
+    data = bytearray(encode_answer(Proposal(1, 2, np.zeros(20)), np.zeros(0), 0))
+    place = ANSWER.fields["joints"][1]
+    for joints in (21, 25, -1, 2**31 - 1):
+        data[place : place + 4] = joints.to_bytes(4, "little", signed=True)
+        assert decode_answer(bytes(data)).proposal.target_rad.size == 0
+
+
+def test_a_hand_that_cannot_be_opened_is_said_to_need_its_battery_cut():
+    def gone():
+        raise RuntimeError("the library gave up")
+
+    safe, words = guard_hand(gone)
+    assert not safe and "gave up" in words and "CUT THE BATTERY" in words
 
 
 def test_systemd_is_told(tmp_path):

@@ -291,6 +291,52 @@ def test_an_old_answer_does_not_renew_the_lease(rig):
     assert first.challenge != rig.state.lease.challenge
 
 
+def _fastest(rig, answers_each_step):
+    """Largest change of a target per control step, of a policy that pushes on."""
+    alpha, sent = rig.limits.step_rad, [rig.out.target_rad]
+    kept = None
+    for k in range(150):
+        if rig.proposed is not None:
+            kept = rig.proposed
+        if answers_each_step and kept is not None:
+            goal = np.clip(rig.state.target_rad + alpha, *rig.limits.allowed_rad.T)
+            rig.proposed = answers_each_step(kept, goal, k)
+        rig.tick()
+        if rig.state.mode != Mode.ACTIVE:
+            break
+        if k % 10 == 0:
+            sent.append(rig.out.target_rad)
+    return float(np.abs(np.diff(sent, axis=0)).max()), rig
+
+
+def test_a_policy_that_answers_all_the_time_moves_no_faster(rig):
+    """The same challenge answered ten times over passes once."""
+    fastest, rig = _fastest(rig, lambda kept, goal, k: replace(kept, target_rad=goal))
+    assert rig.state.mode == Mode.ACTIVE
+    assert 0.9 * rig.limits.step_rad < fastest <= rig.limits.step_rad + 1e-9
+
+
+def test_a_policy_that_claims_later_steps_moves_no_faster(rig):
+    fastest, rig = _fastest(
+        rig, lambda kept, goal, k: replace(kept, target_rad=goal, tick=10**6 + k)
+    )
+    assert fastest <= rig.limits.step_rad + 1e-9
+
+
+def test_targets_of_an_answer_that_renews_nothing_do_not_pass(rig):
+    rig.fault = lambda i, t: _proposal(response=1)(i)
+    before = rig.out.target_rad
+    while rig.tick() is not None and rig.state.mode == Mode.ACTIVE:
+        np.testing.assert_array_equal(rig.out.target_rad, before)
+    assert {f.id for f in rig.state.faults} == {"S11"}
+
+
+def test_a_command_without_an_age_is_a_lost_command(rig):
+    rig.fault = lambda i, t: _proposal(command_age_s=float("nan"))(i)
+    rig.run(0.1)
+    assert {f.id for f in rig.state.faults} == {"S10"}
+
+
 def test_a_fault_told_by_the_policy_never_moves_the_target(rig):
     rig.fault = lambda i, t: _proposal(fault=PolicyFault.OUTPUT)(i)
     while rig.state.mode == Mode.ACTIVE:
