@@ -24,7 +24,7 @@ from sysid.diagnosis import Diagnosis
 from sysid.mechanism import Mechanism
 
 LEAST_MOTION = 2e-3
-"""Least range of target or angle in which something can be seen [rad or m]."""
+"""Least range of a target in which something can be seen [rad or m]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,8 +85,9 @@ def _examined(
 ) -> Examined:
     """Searches one joint, if it moved."""
     drive = mechanism.drives[track.joint]
-    moved = max(np.ptp(np.asarray(track.track.cmd)), track.angle_scale)
-    if moved < LEAST_MOTION or not np.any(track.valid):
+    moved = np.ptp(np.asarray(track.track.cmd)) > LEAST_MOTION
+    pushed = bool(np.any(np.asarray(track.track.ext)))
+    if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)
     alone = not np.any(np.asarray(track.track.others_nm))
     known = {"others_nm": True, "gravity": True, "other_q": not alone}

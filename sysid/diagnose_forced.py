@@ -28,6 +28,7 @@ from envs.hand.effects.base import EffectKind, Stage
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.effects.chain import chain_step, init_states
 from envs.hand.effects.surroundings import Gravity, Surroundings
+from sysid import diagnose_command as command
 from sysid.diagnose_records import SMOOTH_STEPS
 
 BAND_STEPS = 2.2
@@ -50,6 +51,7 @@ class Track:
 
     Attributes:
         cmd, pos, vel, acc: target, encoder angle and its derivatives.
+        held, share: see `Piece`.
         slow_vel: speed that passed the band of the residuals, for friction.
         effort: measured torque of the drive [N·m]; zero where it is not logged.
         push: torque of all that is neither drive nor gravity [N·m].
@@ -66,6 +68,8 @@ class Track:
     """
 
     cmd: Float[Array, "t p"]
+    held: Float[Array, "t s p"]
+    share: Float[Array, "t s p"]
     pos: Float[Array, "t p"]
     vel: Float[Array, "t p"]
     acc: Float[Array, "t p"]
@@ -93,7 +97,11 @@ class Track:
 _STEPWISE = tuple(
     f.name
     for f in dataclasses.fields(Track)
-    if f.name not in ("gravity", "payload_kg", "kp", "kd", "measured", "noise")
+    if f.name
+    not in (
+        *("cmd", "held", "share"),
+        *("gravity", "payload_kg", "kp", "kd", "measured", "noise"),
+    )
 )
 
 
@@ -104,21 +112,6 @@ WALKING = ("finger_weakness",)
 def joint_effects() -> tuple[str, ...]:
     """Returns the effects of the catalogue that a joint can have, in their order."""
     return tuple(n for n, kind in CATALOGUE.items() if kind.acts and n not in WALKING)
-
-
-def _as_command(kind: EffectKind) -> EffectKind:
-    """Lets an effect on the age of readings act on the target instead.
-
-    All readings of a packet have one age. Seen from the readings, the target was sent
-    that much later.
-    """
-    act = kind.acts[Stage.READING]
-
-    def late(params, state, x, dt):
-        state, x2 = act(params, state, x.replace(reading=x.command), dt)
-        return state, x.replace(command=x2.reading)
-
-    return dataclasses.replace(kind, acts={Stage.COMMAND: late})
 
 
 def _pseudo(name: str, acts: Mapping[Stage, object], init=None) -> EffectKind:
@@ -144,11 +137,9 @@ _ENTER = _pseudo(
     lambda params, target, q, dt: jnp.zeros_like(q),
 )
 KINDS = {
-    name: _as_command(CATALOGUE[name])
-    if Stage.READING in CATALOGUE[name].acts
-    else CATALOGUE[name]
-    for name in joint_effects()
+    name: CATALOGUE[name] for name in joint_effects() if name not in command.EFFECTS
 }
+"""Effects that act behind the command path."""
 
 
 @partial(jax.jit, static_argnames=("dt", "names"))
@@ -159,15 +150,16 @@ def forced_residuals(
     friction_speed: Float[Array, ""],
     dt: float,
     names: tuple[str, ...],
-) -> tuple[Float[Array, "m p c"], Float[Array, "m p c"]]:
-    """Returns the residuals (controller, mechanics) of candidates c [N·m].
+) -> tuple[Float[Array, "2 m p c"], Float[Array, "2 m p c"]]:
+    """Returns the residuals (controller, mechanics) of candidates c and their noise.
 
     Where a joint may be at rest, its friction is whatever balances it: those samples
     of the mechanics must not count. Near them friction turns round within the band.
 
     Angles are noisy themselves, so both residuals are divided by the noise that a
     candidate would have, relative to the simulation as it stands: otherwise the fit
-    would lower gains to silence the noise that they amplify.
+    would lower gains to silence the noise that they amplify. The logarithm of that
+    noise comes along: it belongs to the density of the residual.
 
     Args:
         track: the measured motion.
@@ -177,8 +169,14 @@ def forced_residuals(
         friction_speed: speed below which a joint may be at rest.
         dt: step of the grid [s].
         names: effects in the order of the chain.
+
+    Returns:
+        Residuals [N·m], and log(noise / noise of the simulation as it stands).
     """
-    wide = {n: {k: v[None, :] for k, v in params[n].items()} for n in names}
+    path = command.command_path(track.held, track.share, params, dt)
+    wide = {
+        n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in KINDS
+    }
     figures = ("effort_gain", "mass", "skew_s", "push_gain")
     gain, mass, skew, pushed = (nuisance[k][None, :] for k in figures)
 
@@ -186,11 +184,12 @@ def forced_residuals(
         effort = gain * now["effort"]
         enter = {"effort": effort, "measured": track.measured[:, None]}
         slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
-        body = tuple((KINDS[n], wide[n]) for n in names)
+        body = tuple((KINDS[n], p) for n, p in wide.items())
         return ((_SLOW, slow), *body, (_ENTER, enter))
 
     def step(carry, row):
         states, shift, shift_speed = carry
+        row, target = row
         now = {k: v[:, None] for k, v in row.items()}
         q = now["pos"] + skew * now["vel"] - shift
         qd = now["vel"] + skew * now["acc"] - shift_speed
@@ -212,7 +211,6 @@ def forced_residuals(
             ),
         )
         kp, kd = track.kp[:, None], track.kd[:, None]
-        target = jnp.broadcast_to(now["cmd"], q.shape)
         states, x = chain_step(
             model(now), states, target, q, qd, load, kp, kd, dt, around
         )
@@ -224,28 +222,31 @@ def forced_residuals(
         out = {
             "servo": (now["effort"] - states[-1] / gain) / quiet,
             "needs": needs / unit,
-            "command": x.command,
             "follow": x.follows * x.kp / gain / quiet,
             "enters": (1.0 - track.measured[:, None]) / unit * gain * quiet,
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
+            "quiet": jnp.log(quiet),
+            "unit": jnp.log(unit / gain),
         }
         return (states, x.encoder - q, x.encoder_speed - qd), out
 
     rows = {k: getattr(track, k) for k in _STEPWISE}
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
-    target0 = jnp.broadcast_to(first["cmd"], q0.shape)
-    start = (init_states(model(first), target0, q0, dt), 0.0 * q0, 0.0 * q0)
-    out = jax.lax.scan(step, start, rows)[1]
-    return _filtered(out, track.slow_vel[:, :, None], friction_speed)
+    start = (init_states(model(first), path[0], q0, dt), 0.0 * q0, 0.0 * q0)
+    out = jax.lax.scan(step, start, (rows, path))[1]
+    return _filtered(
+        out | {"command": path}, track.slow_vel[:, :, None], friction_speed
+    )
 
 
 def _loudness(track, now, x, gain, inertia):
     """Noise of the residuals of a candidate, and as the simulation stands [N·m]."""
     angle, speed, acc, effort = (track.noise[k] for k in range(4))
     kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
-    servo = jnp.hypot(x.kp * angle, x.kd * speed) / gain
+    # A servo at its limit does not answer to the noise of the angle.
+    servo = x.follows * jnp.hypot(x.kp * angle, x.kd * speed) / gain
     usual_servo = jnp.hypot(kp * angle, kd * speed)
     own = jnp.hypot(inertia * acc, x.viscous * speed) / gain
     usual_own = now["inertia"] * acc
@@ -262,7 +263,9 @@ def _filtered(out, vel, friction_speed):
     rounded = out["follow"] * (_smooth(out["command"]) - out["command"])
     needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
     mechanics = _band(needs + out["enters"] * rounded)
-    return _band(out["servo"] - rounded), mechanics
+    both = jnp.stack([_band(out["servo"] - rounded), mechanics])
+    last = _HALF + EVERY * mechanics.shape[0]
+    return both, jnp.stack([out["quiet"], out["unit"]])[:, _HALF:last:EVERY]
 
 
 def _smooth(x: Float[Array, "t p c"]) -> Float[Array, "t p c"]:

@@ -14,12 +14,12 @@ from jaxtyping import Array, Float
 from envs.hand.effects.chain import chain_step, init_states
 from envs.hand.effects.joint import joint_step
 from envs.hand.effects.surroundings import Gravity, Surroundings
+from sysid.diagnose_command import command_path
 from sysid.diagnose_forced import KINDS, Track
 from sysid.diagnose_problem import Problem
 
 SUBSTEP_S = 0.00125
 _ROWS = (
-    "cmd",
     "pos",
     "push",
     "ext",
@@ -64,13 +64,16 @@ def _closed_loop(
     names: tuple[str, ...],
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side."""
+    path = command_path(track.held, track.share, params, dt * substeps)
     model = tuple(
-        (KINDS[n], {k: v[None, :] for k, v in params[n].items()}) for n in names
+        (KINDS[n], {k: v[None, :] for k, v in params[n].items()})
+        for n in names
+        if n in KINDS
     )
     mass, pushed = mass[None, :], pushed[None, :]
     kp, kd = track.kp[:, None], track.kd[:, None]
 
-    def substep(carry, now):
+    def substep(carry, now, target):
         states, q, qd, _ = carry
         away = q - now["pos"]
         moment = mass[..., None] * (
@@ -92,19 +95,23 @@ def _closed_loop(
                 payload_inertia=now["payload_inertia"],
             ),
         )
-        target = jnp.broadcast_to(now["cmd"], q.shape)
         states, x = chain_step(model, states, target, q, qd, load, kp, kd, dt, around)
         q, qd = joint_step(x, mass * now["inertia"], dt)
         return states, q, qd, x.encoder
 
     def step(carry, row):
+        inner, last = carry
+        row, target = row
         now = {k: v[:, None] for k, v in row.items()}
-        carry = jax.lax.fori_loop(0, substeps, lambda _, c: substep(c, now), carry)
-        return carry, carry[3]
+
+        def some(i, inner):
+            return substep(inner, now, last + (i + 1) / substeps * (target - last))
+
+        inner = jax.lax.fori_loop(0, substeps, some, inner)
+        return (inner, target), inner[3]
 
     rows = {k: getattr(track, k) for k in _ROWS}
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (first["pos"].shape[0], mass.shape[1]))
-    target0 = jnp.broadcast_to(first["cmd"], q0.shape)
-    start = (init_states(model, target0, q0, dt), q0, jnp.zeros_like(q0), q0)
-    return jax.lax.scan(step, start, rows)[1]
+    inner = (init_states(model, path[0], q0, dt), q0, jnp.zeros_like(q0), q0)
+    return jax.lax.scan(step, (inner, path[0]), (rows, path))[1]

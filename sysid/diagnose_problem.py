@@ -29,16 +29,23 @@ CHANNELS = ("controller", "mechanics")
 LONGEST = 20.0
 """Largest number of samples that may tell the same."""
 
-SAMPLING = 0.15
-"""Share of a torque's fast changes that may be an artefact of sampling."""
+SURPLUS = 8.0
+"""Keeps the logarithm of the noise of a fold positive, per sample."""
 
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """Autoregressive noise of one residual: r_t = Σ a_k r_{t−k} + e_t, e ~ (0, s²)."""
+    """Autoregressive noise of one residual: r_t = Σ a_k r_{t−k} + e_t, e ~ (0, s²).
+
+    Attributes:
+        a: a_k.
+        deviation: s, raised by √`alike`.
+        alike: number of samples that tell the same.
+    """
 
     a: Float[np.ndarray, " k"]
     deviation: float
+    alike: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +74,11 @@ class Problem:
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
     ) -> Float[np.ndarray, "c 2 m p"]:
         """Returns the residuals of candidates [N·m], zero where they do not count."""
+        weight = self.weight if weigh else 1.0
+        return np.where(self.valid, self._run(thetas)[0] * weight, 0.0)
+
+    def _run(self, thetas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Returns residuals and the logarithms of their noise (c 2 m p)."""
         parts = []
         for first in range(0, len(thetas), LANES):
             some = thetas[first : first + LANES]
@@ -81,9 +93,9 @@ class Problem:
                 self.space.effects,
             )
             both = np.stack([np.asarray(x, float) for x in jax.device_get(out)])
-            parts.append(np.moveaxis(both, -1, 0)[: len(some)])
-        weight = self.weight if weigh else 1.0
-        return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
+            parts.append(np.moveaxis(both, -1, 1)[:, : len(some)])
+        residuals, loudness = np.concatenate(parts, 1)
+        return residuals, loudness
 
     def whitened(self, raw: Float[np.ndarray, "c 2 m p"]) -> Float[np.ndarray, "c r"]:
         """Returns residuals in units of white noise, flat."""
@@ -94,34 +106,61 @@ class Problem:
         return np.concatenate(out, 1)
 
     def residual(self, thetas: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "c r"]:
-        """Returns the weighted residuals of candidates."""
-        return self.whitened(self.raw(thetas))
+        """Returns the weighted residuals of candidates.
 
-    def folds(self) -> Int[np.ndarray, " r"]:
-        """Returns the fold of every weighted residual."""
-        return np.concatenate([self.fold.ravel()] * 2)
+        Minus twice the logarithm of their density is their sum of squares less
+        `surplus`: of every fold the last element is √(2 Σ log σ + a constant).
+        """
+        raw, loudness = self._run(thetas)
+        white = self.whitened(np.where(self.valid, raw * self.weight, 0.0))
+        alike = np.array([n.alike for n in self.noise])[:, None, None]
+        flat = (loudness / alike).reshape(len(thetas), -1)
+        flat = np.where(self.counts(False), flat, 0.0)
+        sums = [flat[:, self.folds(False) == g].sum(1) for g in self.groups()]
+        least = [SURPLUS * np.sum(self._within(g)) for g in self.groups()]
+        total = 2.0 * np.stack(sums, 1) + np.array(least)
+        return np.concatenate([white, np.sqrt(np.maximum(total, 1e-6))], 1)
 
-    def counts(self) -> Bool[np.ndarray, " r"]:
-        """Tells which weighted residuals count."""
+    def groups(self) -> range:
+        """Numbers of the folds."""
+        return range(int(self.fold.max()) + 1)
+
+    def _within(self, g: int) -> Bool[np.ndarray, " r"]:
+        return self.counts(False) & (self.folds(False) == g)
+
+    @property
+    def surplus(self) -> float:
+        """What the sum of squares of a residual is too large."""
+        return SURPLUS * float(self.counts().sum())
+
+    def folds(self, whole: bool = True) -> Int[np.ndarray, " r"]:
+        """Returns the fold of every weighted residual, at will without the last."""
+        ends = [np.array(self.groups())] if whole else []
+        return np.concatenate([self.fold.ravel()] * 2 + ends)
+
+    def counts(self, whole: bool = True) -> Bool[np.ndarray, " r"]:
+        """Tells which weighted residuals count as samples."""
         kept = [_whole(self.valid[k], len(self.noise[k].a)).ravel() for k in range(2)]
-        return np.concatenate(kept)
+        ends = [np.zeros(len(self.groups()), bool)] if whole else []
+        return np.concatenate(kept + ends)
 
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "Problem":
         """Takes the noise from the repeats of a residual, else from the residual."""
-        noise, sizes = [], []
+        noise, weights = [], []
+        made = _autoregression if self.repeat else _correlated
         for k in range(2):
-            series, valid = raw[k], self.valid[k]
-            if self.repeat:
-                n = self.repeat
-                series = (series[n:] - series[:-n]) / np.sqrt(2.0)
-                valid = valid[n:] & valid[:-n]
-            made = _autoregression if self.repeat else _correlated
-            noise.append(made(series, valid))
-            sizes.append(float(np.std(series[valid])) if valid.any() else 1.0)
-        # The usual error also weighs the samples that sampling makes doubtful.
-        rough = self.data.rough * SAMPLING
-        weight = [1.0 / np.hypot(1.0, rough / max(s, 1e-12)) for s in sizes]
-        return replace(self, noise=tuple(noise), weight=np.stack(weight))
+            series, valid = self._noisy(raw[k], self.valid[k])
+            size = _bulk(series[valid]) if valid.any() else 1.0
+            weights.append(1.0 / np.hypot(1.0, self.data.doubt[k] / size))
+            noise.append(made(*self._noisy(weights[k] * raw[k], self.valid[k])))
+        return replace(self, noise=tuple(noise), weight=np.stack(weights))
+
+    def _noisy(self, series: np.ndarray, valid: np.ndarray):
+        """Returns the difference of repeats, or else the whole."""
+        n = self.repeat
+        if not n:
+            return series, valid
+        return (series[n:] - series[:-n]) / np.sqrt(2.0), valid[n:] & valid[:-n]
 
 
 def make_problem(
@@ -173,6 +212,11 @@ def _whole(valid: np.ndarray, order: int) -> np.ndarray:
     return whole
 
 
+def _bulk(x: np.ndarray) -> float:
+    """Returns the deviation of most of some values; a few may lie far out."""
+    return max(float(np.median(np.abs(x))) / 0.6745, 1e-12)
+
+
 def _autoregression(series: np.ndarray, valid: np.ndarray) -> Noise:
     """Fits the noise of a residual by least squares."""
     whole = _whole(valid, ORDER)
@@ -186,7 +230,6 @@ def _autoregression(series: np.ndarray, valid: np.ndarray) -> Noise:
     gram = rows.T @ rows
     a = np.linalg.solve(gram + 1e-6 * np.trace(gram) * np.eye(ORDER), rows.T @ y)
     rest = y - rows @ a
-    # Reversals leave a few large residuals: the size is that of the bulk.
     return Noise(a, max(float(np.sqrt(np.mean(rest**2))), 1e-12))
 
 
@@ -209,7 +252,8 @@ def _correlated(series: np.ndarray, valid: np.ndarray) -> Noise:
         if rho < 0.1:
             break
         total += 2.0 * rho
-    return Noise(np.zeros(0), max(np.sqrt(power * min(total, LONGEST)), 1e-12))
+    alike = min(total, LONGEST)
+    return Noise(np.zeros(0), max(np.sqrt(power * alike), 1e-12), alike)
 
 
 def _repeat(data: JointTrack) -> int:
@@ -217,20 +261,24 @@ def _repeat(data: JointTrack) -> int:
     if data.valid.shape[1] != 1:
         return 0
     cmd = np.asarray(data.track.cmd, float)[sample_rows(len(data.track.cmd)), 0]
-    x = cmd - cmd.mean()
-    if x.std() < 1e-9:
-        return 0
-    size = 1 << (2 * len(x) - 1).bit_length()
-    spectrum = np.fft.rfft(x, size)
-    corr = np.fft.irfft(np.abs(spectrum) ** 2, size)[: len(x)]
-    energy = np.concatenate([[0.0], np.cumsum(x**2)])
+    known = data.valid[:, 0].astype(float)
+    x = (cmd - cmd.mean()) * known
     lags = np.arange(max(8, int(2.0 / (EVERY * data.dt))), int(0.55 * len(x)))
-    if not lags.size:
+    if not lags.size or x.std() < 1e-9:
         return 0
-    both = (energy[-1] - energy[lags]) * energy[len(x) - lags]
-    likeness = corr[lags] / np.sqrt(np.maximum(both, 1e-30))
+    # Where both readings are known: Σ (x − x')² and Σ x² + x'².
+    both = _overlap(x**2, known)[lags] + _overlap(known, x**2)[lags]
+    apart = both - 2.0 * _overlap(x, x)[lags]
+    likeness = 1.0 - apart / np.maximum(both, 1e-30)
     best = int(np.argmax(likeness))
     return int(lags[best]) if likeness[best] > ALIKE else 0
+
+
+def _overlap(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Returns Σ_t x_{t+k} y_t for all lags k ≥ 0."""
+    size = 1 << (2 * len(x) - 1).bit_length()
+    product = np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size))
+    return np.fft.irfft(product, size)[: len(x)]
 
 
 def _folds(data: JointTrack, logs: Sequence[MeasuredLog], repeat: int) -> np.ndarray:

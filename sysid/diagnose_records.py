@@ -19,8 +19,11 @@ from sysid.data_timing import column_timing, continuous_parts
 GRID_S = 0.004
 """Step that a grid does not go much below [s]; slower logs keep their own."""
 
-MAX_FILL_S = 0.06
+MAX_FILL_S = 0.3
 """Longest stretch without a reading that is bridged by a straight line [s]."""
+
+FORGOTTEN_S = 0.25
+"""Time after which a target that was not logged no longer acts [s]."""
 
 MIN_PIECE_S = 1.5
 """Shorter pieces of a record are left out [s]."""
@@ -40,6 +43,8 @@ class Piece:
         log: index of the record that it is from.
         t_s: times of the grid [s].
         cmd: target, mean over the step that ends here [rad or m].
+        held, share: targets that were held during that step, in their order, and for
+            which shares of it.
         pos: encoder angle, smoothed.
         vel, acc: first and second derivative of `pos`.
         effort: effort in the unit of its column, smoothed; NaN if not logged.
@@ -50,6 +55,8 @@ class Piece:
     log: int
     t_s: Float[np.ndarray, " n"]
     cmd: Float[np.ndarray, "n j"]
+    held: Float[np.ndarray, "n s j"]
+    share: Float[np.ndarray, "n s j"]
     pos: Float[np.ndarray, "n j"]
     vel: Float[np.ndarray, "n j"]
     acc: Float[np.ndarray, "n j"]
@@ -85,7 +92,7 @@ def pieces_of(
             parts = [_joint(log, j, joints[j], start, stop, step_s) for j in joints]
             kept = [part for part in parts if part is not None]
             if len(kept) == len(parts):
-                stacked = {k: np.stack([p[k] for p in kept], 1) for k in kept[0]}
+                stacked = {k: np.stack([p[k] for p in kept], -1) for k in kept[0]}
                 t_s = start + step_s * np.arange(len(stacked["pos"]))
                 pieces.append(Piece(log=index, t_s=t_s, **stacked))
     return pieces
@@ -129,6 +136,7 @@ def _joint(log, joint, effort, start, stop, step_s) -> dict | None:
     fine_s = step_s / every
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
     columns, valid = {}, np.ones(len(fine), bool)
+    held = share = np.zeros((len(fine), 1))
     for key, name in names.items():
         t_s, values = _once(*log.samples(name))
         inside = (t_s >= start - MAX_FILL_S) & (t_s <= stop + MAX_FILL_S)
@@ -136,17 +144,19 @@ def _joint(log, joint, effort, start, stop, step_s) -> dict | None:
             return None
         t_s, values = t_s[inside], values[inside]
         if key == "cmd":
-            columns[key] = _held_mean(t_s, values, fine, fine_s)
+            held, share = held_targets(t_s, values, fine[::every], every + 2)
+            valid &= ~_unsaid(t_s, values, fine, 1.6 * period)
         else:
             columns[key] = np.interp(fine, t_s, values)
-        reach = 1.6 * period if key != "cmd" else 2.0
-        valid &= _near(t_s, fine, reach)
+            valid &= _near(t_s, fine, 1.6 * period)
     sigma = SMOOTH_STEPS * every
     smooth = {k: smoothed(v, sigma)[::every] for k, v in columns.items()}
     slope = [smoothed(columns["pos"], sigma, k)[::every] for k in (1, 2)]
     none = np.full(len(fine[::every]), np.nan)
     return {
-        "cmd": _block_mean(columns["cmd"], every),
+        "cmd": np.sum(held * share, 1),
+        "held": held,
+        "share": share,
         "pos": smooth["pos"],
         "vel": slope[0] / fine_s,
         "acc": slope[1] / fine_s**2,
@@ -183,12 +193,6 @@ def smoothed(
     return out[pad : pad + len(x)]
 
 
-def _block_mean(x: np.ndarray, every: int) -> np.ndarray:
-    """Returns the mean over the steps that end at every `every`-th."""
-    total = np.concatenate([np.full(every - 1, x[0]), x])
-    return np.convolve(total, np.ones(every) / every, "valid")[::every]
-
-
 def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns readings at increasing times; of several at one time the last."""
     order = np.argsort(t_s, kind="stable")
@@ -197,19 +201,46 @@ def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return t_s[last], values[last]
 
 
-def _held_mean(
-    t_s: np.ndarray, values: np.ndarray, grid: np.ndarray, step_s: float
-) -> Float[np.ndarray, " n"]:
-    """Returns the mean of a target that is held, over the step that ends on the grid.
+def held_targets(
+    t_s: Float[np.ndarray, " m"],
+    values: Float[np.ndarray, " m"],
+    grid: Float[np.ndarray, " n"],
+    slots: int,
+) -> tuple[Float[np.ndarray, "n s"], Float[np.ndarray, "n s"]]:
+    """Returns the targets that were held during the steps that end on a grid.
 
-    What acts at a time is what was sent before it; the mean keeps the moment of a
-    change between two points of the grid.
+    What acts at a time is what was sent before it. Where more targets were sent in one
+    step than there are slots, the first of them are left out.
+
+    Args:
+        t_s: times at which targets were sent, increasing [s].
+        values: the targets.
+        grid: ends of the steps, evenly spaced [s].
+        slots: number of targets in a step.
+
+    Returns:
+        Targets in their order, and the shares of the step for which they were held.
     """
-    edges = np.append(grid[0] - step_s, grid)
-    area = np.concatenate([[0.0], np.cumsum(values[:-1] * np.diff(t_s))])
-    last = np.clip(np.searchsorted(t_s, edges, "right") - 1, 0, len(t_s) - 1)
-    total = area[last] + values[last] * (edges - t_s[last])
-    return np.diff(total) / np.diff(edges)
+    step_s = grid[1] - grid[0]
+    last = np.searchsorted(t_s, grid, "right") - 1
+    index = last[:, None] - np.arange(slots - 1, -1, -1)
+    known = np.clip(index, 0, len(t_s) - 1)
+    start = np.where(index >= 0, t_s[known], -np.inf)
+    begin = np.clip((start - grid[:, None]) / step_s + 1.0, 0.0, 1.0)
+    begin[:, 0] = 0.0
+    return values[known], np.diff(begin, append=1.0)
+
+
+def _unsaid(
+    t_s: np.ndarray, values: np.ndarray, grid: np.ndarray, within_s: float
+) -> np.ndarray:
+    """Tells where targets act that may have been sent but are not in the record."""
+    silent = np.diff(t_s) > within_s
+    moved = silent & (np.diff(values) != 0.0)
+    hidden = np.zeros(len(grid), bool)
+    for k in np.flatnonzero(moved):
+        hidden |= (grid > t_s[k]) & (grid < t_s[k + 1] + FORGOTTEN_S)
+    return hidden
 
 
 def _near(t_s: np.ndarray, grid: np.ndarray, within_s: float) -> np.ndarray:

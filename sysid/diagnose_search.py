@@ -246,7 +246,7 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         mine = squares[k * count : (k + 1) * count]
         score = sum(float(mine[g][folds == g].sum()) for g in range(count))
         penalty = _penalty(problem, tasks[k], effects, fit.theta)
-        score = score + penalty if np.isfinite(score) else np.inf
+        score = score - problem.surplus + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
         models.append(Model(tuple(effects), fit, score, penalty, kept))
     return models

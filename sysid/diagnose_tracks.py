@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from envs.errors import InputError, one_of
 from sysid.data import MeasuredLog
 from sysid.diagnose_bodies import bodies_along
+from sysid.diagnose_doubt import sampling_doubt, timing_doubt
 from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
 from sysid.diagnose_records import SMOOTH_STEPS, Piece, grid_step_s, pieces_of, smoothed
 from sysid.mechanism import Mechanism
@@ -25,8 +26,8 @@ class JointTrack:
         dt: step of the grid [s].
         valid: where residual samples (m) of the pieces (p) count.
         moving: where the joint is certainly not at rest (m, p).
-        rough: change of the effort between readings that the band does not hold, which
-            is what sampling can hide [N·m] (m, p).
+        doubt: about both residuals, beyond their usual noise; see `diagnose_doubt`
+            [N·m] (2, m, p).
         log: record that a piece is from.
         start_s: time at which a piece starts [s].
         effort: whether the effort was logged, for every piece.
@@ -40,7 +41,7 @@ class JointTrack:
     dt: float
     valid: Bool[np.ndarray, "m p"]
     moving: Bool[np.ndarray, "m p"]
-    rough: Float[np.ndarray, "m p"]
+    doubt: Float[np.ndarray, "2 m p"]
     log: Int[np.ndarray, " p"]
     start_s: Float[np.ndarray, " p"]
     effort: Bool[np.ndarray, " p"]
@@ -110,6 +111,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     ]
     fields = dict(
         cmd=stack([p.cmd[:, j] for p in pieces]),
+        held=np.moveaxis(stack([p.held[:, :, j] for p in pieces]), 1, 2),
+        share=np.moveaxis(stack([p.share[:, :, j] for p in pieces]), 1, 2),
         pos=stack([p.pos[:, j] for p in pieces]),
         vel=stack([p.vel[:, j] for p in pieces]),
         acc=stack([p.acc[:, j] for p in pieces]),
@@ -151,7 +154,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         dt=step_s,
         valid=valid,
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,
-        rough=_hidden(fields, rows),
+        doubt=_doubt(fields, drive, step_s, rows),
         log=np.array([p.log for p in pieces]),
         start_s=np.array([p.t_s[0] for p in pieces]),
         effort=logged,
@@ -184,14 +187,15 @@ def _neighbour(model, joints: tuple[str, ...], j: int) -> int:
     return j
 
 
-def _hidden(track: dict, rows: np.ndarray) -> np.ndarray:
-    """Returns by how much the torque changes faster than the band, root mean square."""
+def _doubt(track: dict, drive, dt: float, rows: np.ndarray) -> np.ndarray:
+    """Returns the doubt about both residuals (controller, mechanics)."""
+    measured = track["measured"] > 0.0
     error = track["cmd"] - track["pos"]
     servo = track["kp"] * error - track["kd"] * track["vel"]
-    torque = np.where(track["measured"] > 0.0, track["effort"], servo)
-    fast = np.diff(torque, 2, axis=0, prepend=torque[:1], append=torque[-1:])
-    mean = [np.convolve(x, np.ones(9) / 9.0, "same") for x in (fast**2).T]
-    return np.sqrt(np.stack(mean, 1))[rows]
+    fast = sampling_doubt(np.where(measured, track["effort"], servo))
+    late = timing_doubt(track["cmd"], track["vel"], track["kp"], drive, dt)
+    both = np.hypot(fast, late)
+    return np.stack([both, np.where(measured, fast, both)])[:, rows]
 
 
 def _valid(piece: Piece, j: int, steps: int) -> np.ndarray:
@@ -219,11 +223,14 @@ def _noise(logs, joint: str, drive, step_s: float) -> tuple[float, float]:
 
 
 def _rough(t_s: np.ndarray, x: np.ndarray, step_s: float) -> float:
-    """Deviation of the noise of readings, scaled to a step of the grid."""
+    """Deviation of the noise of readings, scaled to a step of the grid.
+
+    The quieter parts of a record count, in which fast motion adds nothing.
+    """
     period = float(np.median(np.diff(t_s)))
     d = np.abs(np.diff(x, 4)) / np.sqrt(70.0)
-    size = float(np.median(d)) / 0.6745
-    if size == 0.0:  # most readings repeat the last one: a coarse encoder
+    size = float(np.quantile(d, 0.3)) / 0.3853
+    if size == 0.0:  # many readings repeat the last one: a coarse encoder
         size = float(np.sqrt(np.mean(d**2)))
     return size * np.sqrt(min(period / step_s, 1.0))
 

@@ -145,7 +145,7 @@ class _State:
         costs = [c if np.isfinite(c) else np.inf for c in costs]
         best = int(np.argmin(costs))
         if costs[best] < self.cost:
-            self.done = self.cost - costs[best] < 1e-4 * self.cost + 1e-2
+            self.done = self.cost - costs[best] < 1e-5 * self.cost + 1e-2
             self.theta, self.r, self.cost = thetas[best], rs[best], costs[best]
             self.damping = max(self.damping * _TRIED[best], 1e-7)
         else:

@@ -1,16 +1,21 @@
 """Commands in whole steps of a register."""
 
 import jax.numpy as jnp
+from jaxtyping import Array, Float
 
 from envs.hand.effects.base import EffectKind, Parameter, Params, Stage, lognormal
 
 
-def _act(params: Params, state, x, dt):
+def quantized(
+    command: Float[Array, "*j"], step_rad: Float[Array, "*j"]
+) -> Float[Array, "*j"]:
     """Rounds to the nearest step; a step of zero leaves the command as it is."""
-    step = params["step_rad"]
-    safe = jnp.where(step > 0.0, step, 1.0)
-    rounded = jnp.round(x.command / safe) * safe
-    return state, x.replace(command=jnp.where(step > 0.0, rounded, x.command))
+    safe = jnp.where(step_rad > 0.0, step_rad, 1.0)
+    return jnp.where(step_rad > 0.0, jnp.round(command / safe) * safe, command)
+
+
+def _act(params: Params, state, x, dt):
+    return state, x.replace(command=quantized(x.command, params["step_rad"]))
 
 
 EFFECT = EffectKind(

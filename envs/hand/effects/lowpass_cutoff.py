@@ -10,7 +10,7 @@ def filtered(
     last: Float[Array, "*j"],
     command: Float[Array, "*j"],
     cutoff_hz: Float[Array, "*j"],
-    dt: float,
+    dt: float | Float[Array, "*j"],
 ) -> Float[Array, "*j"]:
     """Advances the low-pass, exactly for a command that is held over the substep.
 

@@ -10,7 +10,7 @@ def limited(
     last: Float[Array, "*j"],
     command: Float[Array, "*j"],
     speed_rad_s: Float[Array, "*j"],
-    dt: float,
+    dt: float | Float[Array, "*j"],
 ) -> Float[Array, "*j"]:
     """Moves towards the command by at most v_max Δt."""
     reach = speed_rad_s * dt

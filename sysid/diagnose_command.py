@@ -1,0 +1,99 @@
+"""What the servo of a candidate follows: the command path along the sent targets.
+
+Targets are held from one message to the next. A limit of speed answers within a
+message's period, so the path advances from message to message, and not by steps of
+the grid. All its parts but the delays do the same at any time, so the delays may come
+last:
+
+    c(t) = path(t − T − L − d t)
+
+with transport delay T, age of the readings L and drift d of their clock. Seen from
+readings that are late, the target was sent that much later.
+"""
+
+import jax
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from envs.hand.effects.command_quantization import quantized
+from envs.hand.effects.lowpass_cutoff import filtered
+from envs.hand.effects.slew_limit import limited
+
+EFFECTS = (
+    "transport_delay",
+    "command_quantization",
+    "lowpass_cutoff",
+    "slew_limit",
+    "sensor_latency",
+    "clock_drift",
+)
+"""Effects that act here."""
+
+Params = dict[str, dict[str, Float[Array, " c"]]]
+
+
+def command_path(
+    held: Float[Array, "t s p"], share: Float[Array, "t s p"], params: Params, dt: float
+) -> Float[Array, "t p c"]:
+    """Returns the commands of candidates c at the steps of the grid [rad or m].
+
+    Args:
+        held: targets that were held during the step that ends here, in their order.
+        share: for which shares of the step.
+        params: values of the parameters by effect; effects may be missing.
+        dt: step of the grid [s].
+    """
+    given = {name: value for name, value in params.items() if name in EFFECTS}
+    count = next(x for v in params.values() for x in v.values()).shape[0]
+
+    def value(effect: str, name: str, absent: float) -> Float[Array, " c"]:
+        return given[effect][name] if effect in given else jnp.full(count, absent)
+
+    grid = value("command_quantization", "step_rad", 0.0)
+    cutoff = value("lowpass_cutoff", "cutoff_hz", jnp.inf)
+    speed = value("slew_limit", "speed_rad_s", jnp.inf)
+
+    def step(carry, row):
+        smooth, command = carry
+        for target, part in zip(*row, strict=True):
+            # No time at all would make 0 × ∞ of an absent limit.
+            h = jnp.maximum(part, 1e-6)[:, None] * dt
+            last = smooth
+            smooth = filtered(last, quantized(target[:, None], grid), cutoff, h)
+            command = _pursuit(command, last, smooth, speed, h)
+        return (smooth, command), command
+
+    first = quantized(held[0, 0][:, None], grid)
+    first = jnp.broadcast_to(first, (held.shape[2], count))
+    path = jax.lax.scan(step, (first, first), (held, share))[1]
+    age = value("transport_delay", "delay_s", 0.0)
+    age = age + value("sensor_latency", "latency_s", 0.0)
+    t_s = dt * jnp.arange(len(held))[:, None]
+    drift = 1e-6 * value("clock_drift", "drift_ppm", 0.0)
+    return _late(path, (age + drift * t_s) / dt)
+
+
+def _pursuit(command, last, goal, speed, h):
+    """Moves at a limited speed towards a goal that moves evenly from `last` to `goal`.
+
+    Where the goal comes to meet it, the command turns round with it within the step.
+    """
+    gap = last - command
+    speed = jnp.minimum(speed, 1e6)
+    closing = speed * h - jnp.sign(gap) * (goal - last)
+    part = jnp.clip(jnp.abs(gap) / jnp.maximum(closing, 1e-9), 0.0, 1.0)
+    met = command + jnp.sign(gap) * speed * part * h
+    return limited(met, goal, speed, (1.0 - part) * h)
+
+
+def _late(
+    path: Float[Array, "t p c"], steps: Float[Array, "t c"]
+) -> Float[Array, "t p c"]:
+    """Reads a path some steps earlier: on straight lines between its samples."""
+    last = len(path) - 1.0
+    place = jnp.clip(jnp.arange(len(path))[:, None] - steps, 0.0, last)
+    low = jnp.clip(jnp.floor(place), 0.0, last - 1.0).astype(jnp.int32)
+    part = (place - low)[:, None]
+    before = jnp.take_along_axis(path, low[:, None], 0)
+    after = jnp.take_along_axis(path, low[:, None] + 1, 0)
+    return (1.0 - part) * before + part * after
