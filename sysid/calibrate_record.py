@@ -7,14 +7,15 @@ from jaxtyping import Bool, Float
 
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
+from sysid.calibrate_neighbours import Neighbours, neighbours_along
 from sysid.data import MeasuredLog
 from sysid.data_timing import continuous_parts
 from sysid.excite import rest_posture
 from sysid.mechanism import Mechanism
 from sysid.rigid import gravity_torque, rigid_along
 
-STEP_S = 0.001
-_POSTURE_S = 0.01
+STEP_S, BLOCK_S = 0.001, 1.0
+_EVERY, _SPARSE = 10, 4
 _SETTLE_S = 0.5
 _LEAST_ROWS = 50
 
@@ -31,7 +32,7 @@ class Record:
         held: target at every step [rad].
         load, load_slope: torque of gravity at every step and its change with the angle.
         angle: measured angle at every step [rad].
-        inertia: mean inertia of the joint [kg·m²].
+        neighbours: inertia of the joint, and what moves along with it.
     """
 
     t_s: Float[np.ndarray, " n"]
@@ -41,14 +42,21 @@ class Record:
     load: Float[np.ndarray, " m"]
     load_slope: Float[np.ndarray, " m"]
     angle: Float[np.ndarray, " m"]
-    inertia: float
+    neighbours: Neighbours
 
     def at_rows(self, steps: Float[np.ndarray, "c m k"]) -> Float[np.ndarray, "c n k"]:
         """Reads simulated steps at the times of the rows."""
-        place = np.clip(self.t_s / STEP_S, 0.0, steps.shape[1] - 1.001)
-        low = place.astype(int)
-        share = (place - low)[:, None]
-        return (1.0 - share) * steps[:, low] + share * steps[:, low + 1]
+        return np.stack([at_times(self.t_s, steps[..., i]) for i in (0, 1)], -1)
+
+
+def at_times(
+    t_s: Float[np.ndarray, " n"], steps: Float[np.ndarray, "c m"]
+) -> Float[np.ndarray, "c n"]:
+    """Reads simulated steps at any times [s]."""
+    place = np.clip(t_s / STEP_S, 0.0, steps.shape[1] - 1.001)
+    low = place.astype(int)
+    share = place - low
+    return (1.0 - share) * steps[:, low] + share * steps[:, low + 1]
 
 
 def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:
@@ -73,16 +81,20 @@ def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:
         found = f"{int(valid[:, 0].sum())} readings after {_SETTLE_S:g} s"
         raise InputError(log.source, f"pos.{joint}", found, f"at least {_LEAST_ROWS}")
     grid = np.arange(int(t_s[-1] / STEP_S) + 2) * STEP_S
-    load, slope, inertia = _gravity(mechanism, log, joint, grid)
+    postures = _postures(mechanism, log, grid)
+    load, slope = _gravity(mechanism, log, joint, postures, grid)
+    held = {j: _held(log, f"cmd.{j}", grid) for j in log.header.joints}
+    sparse = postures[::_SPARSE]
+    every = _SPARSE * _EVERY
     return Record(
         t_s=t_s,
         measured=measured,
         valid=valid,
-        held=_held(log, f"cmd.{joint}", grid),
+        held=held[joint],
         load=load,
         load_slope=slope,
         angle=_between(log, f"pos.{joint}", grid),
-        inertia=inertia,
+        neighbours=neighbours_along(mechanism, sparse, every, held, joint, STEP_S),
     )
 
 
@@ -119,10 +131,11 @@ def _between(log: MeasuredLog, name: str, grid: np.ndarray) -> np.ndarray:
     return np.interp(grid, t_s - log.t_s[0], values)
 
 
-def _gravity(mechanism: Mechanism, log: MeasuredLog, joint: str, grid: np.ndarray):
-    """Gravity's torque at every step, with its slope, and the joint's inertia."""
-    every = round(_POSTURE_S / STEP_S)
-    coarse = grid[::every]
+def _postures(
+    mechanism: Mechanism, log: MeasuredLog, grid: np.ndarray
+) -> Float[np.ndarray, "c j"]:
+    """Angles of all joints, once in `_EVERY` steps; others rest."""
+    coarse = grid[::_EVERY]
     postures = np.tile(rest_posture(mechanism), (len(coarse), 1))
     for name in log.header.joints:
         if name not in mechanism.joints:
@@ -130,10 +143,22 @@ def _gravity(mechanism: Mechanism, log: MeasuredLog, joint: str, grid: np.ndarra
             raise InputError(log.source, "joints", name, valid)
         column = mechanism.joints.index(name)
         postures[:, column] = _between(log, f"pos.{name}", coarse)
+    return postures
+
+
+def _gravity(
+    mechanism: Mechanism,
+    log: MeasuredLog,
+    joint: str,
+    postures: np.ndarray,
+    grid: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Gravity's torque at every step, with its slope."""
     rotation = np.zeros(9)
     mujoco.mju_quat2Mat(rotation, np.asarray(log.header.palm_quat_w))
     pull = rotation.reshape(3, 3).T @ mechanism.model.opt.gravity
     j = mechanism.joints.index(joint)
-    around, slope, inertia = rigid_along(mechanism, postures, j, pull)
-    fine = [np.interp(grid, coarse, x) for x in (gravity_torque(around), slope)]
-    return *fine, inertia
+    around, slope, _ = rigid_along(mechanism, postures, j, pull)
+    coarse = grid[::_EVERY]
+    load, slope = (np.interp(grid, coarse, x) for x in (gravity_torque(around), slope))
+    return load, slope

@@ -1,0 +1,157 @@
+"""One joint simulated on its recorded targets.
+
+Stiffness, damping, delay, cutoff and speed limit are the servo's; inertia, weight, dry
+and viscous friction say what the servo works against. All of them are factors or
+figures whose logarithms are searched, but for the frictions.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.hand.effects.joint import joint_step
+from sysid.calibrate_record import BLOCK_S, STEP_S, Record
+from sysid.calibrate_search import Search
+
+SERVO = slice(0, 5)
+"""Parameters of the servo; after them inertia, weight, dry and viscous friction."""
+
+BODY_DEVIATION = np.array([0.05, 0.05, 1.0, 1.0])
+"""Of the priors of the rest: of logarithms, of frictions in units of the largest torque
+and of the velocity gain."""
+
+# The delay comes last: it may, for the path is the same at all times, and between two
+# steps a smooth command can be read where a jump cannot (a speed limit would take a
+# part of a jump for the whole of it).
+_NAMES = (
+    "lowpass_cutoff",
+    "slew_limit",
+    "transport_delay",
+    "torque_limit",
+    "coulomb_friction",
+    "viscous_friction",
+)
+
+
+class Motion:
+    """Residual of the simulated angle and effort of one joint."""
+
+    def __init__(
+        self, records: Sequence[Record], gains: tuple[float, float], limit_nm: float
+    ):
+        self.records, self.gains, self.limit = records, gains, limit_nm
+        torque = max(float(np.max(np.abs(r.load))) for r in records)
+        self.torque = max(torque, 0.01 * gains[0])
+        self.scales = [np.array([1e-3, max(0.02 * self.torque, 1e-3)]) for _ in records]
+
+    def steps(self, thetas: Float[np.ndarray, "c 9"]) -> list[np.ndarray]:
+        """Angles and efforts of candidates at the steps of every record."""
+        figures = (*self.gains, self.limit, self.torque)
+        found = []
+        for r in self.records:
+            n = r.neighbours
+            own = (r.held, r.load, r.load_slope, r.angle, n.inertia)
+            along = (n.moved, n.left, n.inverse, n.command)
+            inputs = [jnp.asarray(x, jnp.float32) for x in (*own, *along)]
+            out = _simulate(
+                jnp.asarray(thetas, jnp.float32), inputs, figures, (n.kp, n.kd)
+            )
+            found.append(np.asarray(out, dtype=float))
+        return found
+
+    def simulate(self, thetas: Float[np.ndarray, "c 9"]) -> list[np.ndarray]:
+        """Angles and efforts of candidates at the rows of every record."""
+        pairs = zip(self.records, self.steps(thetas), strict=True)
+        return [record.at_rows(steps) for record, steps in pairs]
+
+    def residuals(self, thetas: Float[np.ndarray, "c 9"]) -> Float[np.ndarray, "c n"]:
+        """Weighted residuals, all records one after the other."""
+        parts = []
+        simulated = self.simulate(thetas)
+        for r, y, scale in zip(self.records, simulated, self.scales, strict=True):
+            rest = np.where(r.valid, np.nan_to_num(r.measured) - y, 0.0) / scale
+            parts.append(rest.reshape(len(thetas), -1))
+        return np.nan_to_num(np.concatenate(parts, 1), nan=1e3, posinf=1e3, neginf=-1e3)
+
+    def weigh(self, residual: Float[np.ndarray, " n"]) -> None:
+        """Takes the scatter of a fit as the scatter of the readings."""
+        first = 0
+        for i, r in enumerate(self.records):
+            rest = residual[first : first + r.valid.size].reshape(r.valid.shape)
+            first += r.valid.size
+            count = np.maximum(r.valid.sum(0), 1)
+            factor = np.sqrt(np.sum(rest**2, 0) / count)
+            self.scales[i] = self.scales[i] * np.maximum(factor, 1e-6)
+
+    def search(
+        self, center: Float[np.ndarray, " 5"], deviation: Float[np.ndarray, " 5"]
+    ) -> Search:
+        """The least-squares problem with priors of the servo's parameters."""
+        low, high = np.full(9, -np.inf), np.full(9, np.inf)
+        high[2], low[7:] = np.log(0.095), 0.0
+        return Search(
+            self.residuals,
+            np.append(center, np.zeros(4)),
+            np.append(deviation, BODY_DEVIATION),
+            low,
+            high,
+        )
+
+    def blocks(self) -> Int[np.ndarray, " n"]:
+        """Number of the block of every residual."""
+        parts, first = [], 0
+        for r in self.records:
+            number = first + (r.t_s // BLOCK_S).astype(int)
+            first = int(number.max()) + 1
+            parts.append(np.repeat(number, r.valid.shape[1]))
+        return np.concatenate(parts)
+
+
+@jax.jit
+def _simulate(thetas, inputs, figures, held_by):
+    """Simulates candidates; returns (candidates, steps, angle and effort)."""
+    kp, kd, limit, torque = figures
+
+    def single(theta):
+        values = (
+            {"cutoff_hz": jnp.exp(theta[3])},
+            {"speed_rad_s": jnp.exp(theta[4])},
+            {"delay_s": jnp.exp(theta[2])},
+            {"limit_nm": limit},
+            {"torque_nm": torque * jnp.maximum(theta[7], 0.0)},
+            {"damping_nms": kd * jnp.maximum(theta[8], 0.0)},
+        )
+        pairs = zip(_NAMES, values, strict=True)
+        model = [(CATALOGUE[name], value) for name, value in pairs]
+        gains = (kp * jnp.exp(theta[0]), kd * jnp.exp(theta[1]))
+        heavy, weight = jnp.exp(theta[5]), jnp.exp(theta[6])
+
+        def step(carry, now):
+            states, q, v, others, speeds = carry
+            target, load, slope, about, inertia, moved, left, inverse, command = now
+            push = held_by[0] * (command - others) - held_by[1] * speeds
+            load = weight * (load + slope * (q - about)) - moved @ push
+            states, x = chain_step(model, states, target, q, v, load, *gains, STEP_S)
+            # Speeds stand between the angles: half the implicit damping takes the
+            # drive's at the angle, which is right to second order in the step.
+            half = 0.5 * x.damping
+            body = heavy * inertia + left
+            q, after = joint_step(replace(x, damping=half), body, STEP_S)
+            effort = x.effort - half * (after - v)
+            speeds = speeds + STEP_S * inverse @ push - moved * (after - v)
+            others = others + STEP_S * speeds
+            told = jnp.stack([x.reading, effort])
+            return (states, q, after, others, speeds), told
+
+        states = init_states(model, inputs[0][0], inputs[3][0], STEP_S)
+        others = inputs[-1][0]
+        carry = (states, inputs[3][0], jnp.zeros(()), others, jnp.zeros_like(others))
+        return jax.lax.scan(step, carry, inputs)[1]
+
+    return jax.lax.map(single, thetas, batch_size=8)

@@ -1,0 +1,146 @@
+"""Joints that move along because another one accelerates.
+
+Their servos hold neighbours with finite stiffness, so a joint does not feel the mass
+matrix's diagonal but what is left of it:
+
+    A x_o + m x = Δt f_o,      A = M_oo + Δt diag(kd_o) / 2
+    (M − mᵀ A⁻¹ m) x = Δt (f − mᵀ A⁻¹ f_o)
+
+with speed changes x of the joint and x_o of its neighbours, their servos' torques f_o
+and the coupling m = M_oj. Left out, it bends stiffness by up to a tenth. Neighbours
+have the gains that the simulation gives them.
+"""
+
+from dataclasses import dataclass
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float
+
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step, init_states
+from envs.quiet_mujoco import mujoco
+from sysid.excite import joint_address
+from sysid.mechanism import JointDrive, Mechanism
+
+_COUPLED = 0.02
+"""Share of its own inertia from which on a coupling counts."""
+
+_COMMAND = ("lowpass_cutoff", "slew_limit", "transport_delay")
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """Coupled joints at every step of a record (m steps, k neighbours).
+
+    Attributes:
+        inertia: the joint's own, with its drive's [kg·m²].
+        moved: A⁻¹ m, how much neighbours move along.
+        left: M − mᵀ A⁻¹ m without the joint's own inertia, ≤ 0 [kg·m²].
+        inverse: A⁻¹ [1/(kg·m²)].
+        command: where their servos want to be [rad].
+        kp, kd: of their servos.
+    """
+
+    inertia: Float[np.ndarray, " m"]
+    moved: Float[np.ndarray, "m k"]
+    left: Float[np.ndarray, " m"]
+    inverse: Float[np.ndarray, "m k k"]
+    command: Float[np.ndarray, "m k"]
+    kp: Float[np.ndarray, " k"]
+    kd: Float[np.ndarray, " k"]
+
+
+def neighbours_along(
+    mechanism: Mechanism,
+    postures: Float[np.ndarray, "c j"],
+    every: int,
+    targets: dict[str, Float[np.ndarray, " m"]],
+    joint: str,
+    dt: float,
+) -> Neighbours:
+    """Finds what moves along with a joint.
+
+    Args:
+        mechanism: the simulation as it stands.
+        postures: angles of all joints, once in `every` steps [rad].
+        every: steps between two postures.
+        targets: targets of all joints that have any, at every step [rad].
+        joint: whose neighbours.
+        dt: step [s].
+    """
+    names = mechanism.joints
+    j, steps = names.index(joint), len(targets[joint])
+    matrices = _inertia(mechanism, postures)
+    share = np.max(np.abs(matrices[:, j]), 0) / np.mean(matrices[:, j, j])
+    others = [o for o in range(len(names)) if o != j and share[o] > _COUPLED]
+    drives = [mechanism.drives[names[o]] for o in others]
+    kd = np.array([drive.kd.value for drive in drives])
+    coupling = matrices[:, others, j]
+    inverse = np.linalg.inv(matrices[:, others][:, :, others] + 0.5 * dt * np.diag(kd))
+    moved = np.einsum("tab,tb->ta", inverse, coupling)
+    rest = np.take(np.mean(postures, 0), others)
+    commands = [
+        _command(drive, targets[names[o]], dt) if names[o] in targets
+        else np.full(steps, angle)
+        for o, drive, angle in zip(others, drives, rest, strict=True)
+    ]  # fmt: skip
+    return Neighbours(
+        inertia=_fine(matrices[:, j, j], every, steps),
+        moved=_fine(moved, every, steps),
+        left=_fine(-np.sum(moved * coupling, 1), every, steps),
+        inverse=_fine(inverse, every, steps),
+        command=np.stack(commands, 1) if commands else np.zeros((steps, 0)),
+        kp=np.array([drive.kp.value for drive in drives]),
+        kd=kd,
+    )
+
+
+def _inertia(
+    mechanism: Mechanism, postures: Float[np.ndarray, "c j"]
+) -> Float[np.ndarray, "c j j"]:
+    """Mass matrices of all joints that have a drive."""
+    model, data = mechanism.model, mujoco.MjData(mechanism.model)
+    qpos, dofs = joint_address(mechanism)
+    found, column = np.zeros((len(postures), len(dofs), len(dofs))), np.zeros(model.nv)
+    for matrix, posture in zip(found, postures, strict=True):
+        data.qpos[qpos] = posture
+        mujoco.mj_forward(model, data)
+        for row, dof in zip(matrix, dofs, strict=True):
+            mujoco.mj_mulM(model, data, column, np.eye(model.nv)[dof])
+            row[:] = column[dofs]
+    return found
+
+
+def _fine(values: np.ndarray, every: int, steps: int) -> np.ndarray:
+    """Values of every step, linear between those of the postures."""
+    place = np.minimum(np.arange(steps) / every, len(values) - 1.0)
+    low = np.minimum(place.astype(int), max(len(values) - 2, 0))
+    share = (place - low).reshape(-1, *[1] * (values.ndim - 1))
+    high = np.minimum(low + 1, len(values) - 1)
+    return (1.0 - share) * values[low] + share * values[high]
+
+
+def _command(
+    drive: JointDrive, held: Float[np.ndarray, " m"], dt: float
+) -> Float[np.ndarray, " m"]:
+    """Command of a servo behind its delay, low-pass and speed limit."""
+    model = [
+        (
+            CATALOGUE[name],
+            {k: jnp.asarray(v.value) for k, v in drive.effects[name].items()},
+        )
+        for name in _COMMAND
+        if name in drive.effects
+    ]
+    none, first = jnp.zeros(()), float(held[0])
+
+    def step(states, target):
+        states, x = chain_step(model, states, target, none, none, 0.0, 1.0, 0.0, dt)
+        return states, x.command
+
+    # Float32 holds 0.1 µrad of a deviation, and none of a multiple of π.
+    away = jnp.asarray(held - first, jnp.float32)
+    found = jax.lax.scan(step, init_states(model, away[0], none, dt), away)[1]
+    return np.asarray(found, dtype=float) + first
