@@ -187,7 +187,7 @@ class _Gone:
 
 
 def _gamepad_lost(lab: Lab, rng: Rng) -> None:
-    lab.link.policies._source = _Gone(lab.source.poll(lab.clock.t))
+    lab.link.policies.sources.command = _Gone(lab.source.poll(lab.clock.t))
 
 
 def _hang(lab: Lab, rng: Rng) -> None:

@@ -15,6 +15,7 @@ import fingers_mjx
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import load_stance
+from envs.registry import make_batch
 from fingers_deploy.bundle import Bundle
 from fingers_deploy.manifest import (
     Action,
@@ -28,6 +29,7 @@ from fingers_deploy.manifest import (
 from fingers_mjx.bundle import encode_bundle, write_bundle
 from fingers_mjx.hand_mjcf import standing_mjcf
 from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.policy_interface import interface_of
 
 WALKING = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 """The committed policy."""
@@ -90,6 +92,19 @@ def marching_bundle(task: str = "crawl") -> Bundle:
     action = np.clip(obs @ layers[0][0] + layers[0][1], -CLIP, CLIP)
     provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
     return encode_bundle(weights, task, hand_interface(), provenance, (obs, action))
+
+
+def standing_bundle(task: str) -> Bundle:
+    """A policy that stands in the stance of a task: its actions are all zero."""
+    interface = interface_of(make_batch(task, 1))
+    size = sum(term.size * term.history for term in interface.observation.terms)
+    zero, one = np.zeros(size, np.float32), np.ones(size, np.float32)
+    layers = ((np.zeros((size, 20), np.float32), np.zeros(20, np.float32)),)
+    weights = PolicyWeights(layers, zero, one, interface.action.clip)
+    obs = np.random.default_rng(0).normal(0, 0.3, (8, size)).astype(np.float32)
+    provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
+    answers = obs, np.zeros((8, 20), np.float32)
+    return encode_bundle(weights, task, interface, provenance, answers)
 
 
 def main() -> None:

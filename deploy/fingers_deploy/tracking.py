@@ -48,6 +48,10 @@ class ObjectTracker:
         self._frame: Frame | None = None
         self._slow: Array = np.zeros(3)
 
+    def aim(self, target_pos_w: ArrayLike) -> None:
+        """Sets another target [m], [3]."""
+        self._target = np.asarray(target_pos_w, np.float64)
+
     def update(self, frame: Frame) -> None:
         """Takes in the newest sample; one that was seen before changes nothing.
 

@@ -8,7 +8,7 @@ from fault_processes import SIGNALS, WITHIN_S, kill_one, plain_options
 from fault_scenarios import SCENARIOS
 from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
-from hand_files import WALKING
+from hand_files import WALKING, standing_bundle
 
 from fingers_deploy import load_bundle
 from fingers_deploy.drivers.sim import SimulatorProcess
@@ -123,6 +123,25 @@ def test_switching_policies_while_walking(hand_model):
     begin = lab.driver.hand.data.qpos[:2].copy()
     lab.run(4.0)
     assert lab.mode == Mode.ACTIVE and lab.core.state.faults == ()
+    assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
+
+
+def test_switching_to_the_stance_of_another_task_and_back(hand_model):
+    """From full speed: the hand stops, stands as for typing, and walks again."""
+    both, sticks = (load_bundle(WALKING), standing_bundle("keyboard")), (1.0, 0.0, 0.0)
+    lab = Lab(hand_model, both, sticks=sticks, loop_hz=250).activate()
+    lab.run(2.0).forget()
+    for number in (1, 0):
+        lab.core.selected = number
+        lab.run(8.0)
+        assert lab.mode == Mode.ACTIVE and lab.core.state.faults == (), lab.events
+        assert lab.link.policies.active == number
+        # The limits are those of the policy that runs: in typing 15 degrees of tilt.
+        assert lab.core.limits is lab.core._limits[number]
+    targets = np.array([target for _, target in lab.driver.written])
+    assert np.abs(np.diff(targets, axis=0)).max() <= 0.06 + 1e-6
+    begin = lab.driver.hand.data.qpos[:2].copy()
+    lab.run(4.0)
     assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
 
 

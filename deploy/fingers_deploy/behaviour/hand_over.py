@@ -1,9 +1,10 @@
 """Switching policies: the next one inherits the history that it would have had.
 
 The last control steps are kept in physical terms: measured angles, gravity, rates,
-commands, and by how much the targets were asked to move. From these, the observation
-history of any policy can be built: with its own reference angles and scales, and with
-the previous actions that would have asked for the same motion,
+what gamepad, keys and camera told, and by how much the targets were asked to move. From
+these, the observation history of any policy can be built: with its own reference
+angles, scales and inputs, and with the previous actions that would have asked for the
+same motion,
 
     a = clip(atanh(Δ/α), ±c),
 
@@ -15,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fingers_deploy.behaviour.task_inputs import Given, inputs_of
 from fingers_deploy.manifest import Interface
-from fingers_deploy.observation import History, ObservationAssembler, input_size
+from fingers_deploy.observation import History, ObservationAssembler
 
 Array = NDArray[np.float32]
 
@@ -29,14 +31,14 @@ class Moment:
         joint_pos: measured angles [rad], [20].
         gravity_b: gravity in the palm frame, [3].
         angvel_b: angular velocity in the palm frame [rad/s], [3].
-        command: task inputs, [n].
+        given: what the sources of commands told, by name of the term.
         asked_rad: asked change of the targets, α·tanh(a), [20].
     """
 
     joint_pos: NDArray
     gravity_b: NDArray
     angvel_b: NDArray
-    command: NDArray
+    given: Given
     asked_rad: NDArray
 
 
@@ -72,22 +74,14 @@ def build_history(
     """
     history: History | None = None
     action = np.zeros(len(interface.joint_names), np.float32)
-    size = input_size(interface)
     for moment in moments:
         sample = assembler.sample(
             moment.joint_pos,
             moment.gravity_b,
             moment.angvel_b,
             action,
-            resized(moment.command, size),
+            inputs_of(interface, moment.given, moment.joint_pos),
         )
         history = assembler.update(history, sample)
         action = action_for(moment.asked_rad, interface)
     return history, action
-
-
-def resized(command: NDArray, size: int) -> NDArray:
-    """A command of another task: the common entries, zeros behind them."""
-    kept = np.zeros(size, np.float32)
-    kept[: min(size, len(command))] = command[:size]
-    return kept

@@ -72,6 +72,10 @@ class Plan:
         self._step_rad = interface.action.scale_rad
         self._start_s: float | None = None
 
+    def finish(self) -> tuple[str, ...]:
+        """Has nothing to tell."""
+        return ()
+
     def answer(self, packet: np.void) -> bytes:
         """Answers one observation; the plan begins when the policy may run."""
         target = np.asarray(packet["target"], np.float64)

@@ -1,6 +1,7 @@
-"""The policy's side of the link: which policy runs, with what command.
+"""The policy's side of the link: which policy runs, told what.
 
     operator selects ──► policy ──(recovery, upright)──► settle ramp ──► first policy
+        └── another stance ──► stand ──► ramp to the own one, to that ──► policy
 
 A recovery policy that is the first itself goes on holding the stance after the ramp.
 While the supervisor does not let the policy run, every policy starts afresh at the
@@ -12,39 +13,39 @@ from collections import deque
 import numpy as np
 from numpy.typing import NDArray
 
-from fingers_deploy.behaviour.command import (
-    CommandSource,
-    CommandState,
-    command_step,
-    rest_command,
-)
-from fingers_deploy.behaviour.hand_over import (
-    Moment,
-    asked_for,
-    build_history,
-    resized,
-)
-from fingers_deploy.behaviour.heading import HeadingConfig, heading_step
+from fingers_deploy.behaviour.command import CommandSource
+from fingers_deploy.behaviour.hand_over import Moment, asked_for, build_history
+from fingers_deploy.behaviour.heading import HeadingConfig
+from fingers_deploy.behaviour.key_runner import KeyRunner
 from fingers_deploy.behaviour.settle import Ramp, settle_ramp
+from fingers_deploy.behaviour.sources import Sources, Told
+from fingers_deploy.behaviour.task_inputs import inputs_of
+from fingers_deploy.behaviour.tracker_port import TrackerPort
 from fingers_deploy.behaviour.upright import tilt_angle, upright_step
 from fingers_deploy.controller import PolicyController
-from fingers_deploy.rotations import gravity, heading, multiply
+from fingers_deploy.manifest import Interface
+from fingers_deploy.rotations import gravity
 from fingers_deploy.runtime.link import encode_answer
 from fingers_deploy.safety.detect_policy import complement
 from fingers_deploy.safety.types import PolicyFault, Proposal
 
 Array = NDArray[np.float64]
 RECOVERY = "recovery"
-_YAW = 2  # entry of the crawl command
+SAME_STANCE_RAD = 0.02
+STAND_S = 1.0
+"""Time without a command before a ramp to another stance: a hand that is stopped in the
+middle of a stride may fall over, one that stands does not."""
 
 
 class Policies:
-    """One or more policies and the source of their command.
+    """One or more policies and what they are told.
 
     Args:
         controllers: the policies; the first is the one to which recovery leads.
         source: of the command.
         heading_hold: gains, for policies whose command has a yaw rate; None: off.
+        keys: requests, for policies that press keys.
+        tracker: camera, for policies that push an object.
     """
 
     def __init__(
@@ -52,9 +53,11 @@ class Policies:
         controllers: tuple[PolicyController, ...],
         source: CommandSource,
         heading_hold: HeadingConfig | None = None,
+        keys: KeyRunner | None = None,
+        tracker: TrackerPort | None = None,
     ):
-        self._controllers, self._source = controllers, source
-        self._hold = heading_hold
+        self._controllers = controllers
+        self.sources = Sources(source, heading_hold, keys, tracker)
         longest = max(
             term.history
             for c in controllers
@@ -63,8 +66,10 @@ class Policies:
         self._moments: deque[Moment] = deque(maxlen=longest + 1)
         self._active = self._selected = 0
         self._ramp: Ramp | None = None
-        self._upright_s, self._reference = np.inf, None
-        self._state = CommandState(rest_command(self._ranges(0)), 0.0)
+        self._stances: tuple[int, ...] = ()
+        self._then: int | None = None
+        self._held = False
+        self._stood_s = self._upright_s = np.inf
 
     @property
     def active(self) -> int:
@@ -76,113 +81,131 @@ class Policies:
         """Whether a ramp moves the targets, or holds them where it ended."""
         return self._ramp is not None
 
+    def finish(self) -> tuple[str, ...]:
+        """Lets go of the sources; returns what the operator should know of them."""
+        return self.sources.finish()
+
     def answer(self, packet: np.void) -> bytes:
         """Answers one observation of the supervisor."""
         t, target = float(packet["t_s"]), packet["target"]
         if not packet["runs"]:
             self._rest(packet)
         elif int(packet["policy"]) != self._selected:
-            self._select(int(packet["policy"]), target)
-        command, age_s = self._command(packet["quat"], t)
+            self._select(int(packet["policy"]), target, t)
+        interface = self._interface(self._active)
+        told = self.sources.hear(packet, interface, self._stood_s < np.inf)
+        inputs = inputs_of(interface, told.given, packet["pos"])
         fault = PolicyFault.NONE
         if packet["runs"] and self._ramp is not None:
-            target = self._follow_ramp(packet, command, t)
+            target = self._follow_ramp(self._ramp, packet, told, t)
+        elif packet["runs"] and not told.moves:
+            self._held = True
+            self._keep(packet, told, np.zeros(len(target)))
         elif packet["runs"]:
-            target, fault = self._run(packet, command)
+            target, fault = self._run(packet, told, inputs)
             self._look_for_upright(packet, target, t)
+        if packet["runs"] and t >= self._stood_s:
+            # By its own stance, from which the way to the other one is tested.
+            self._settle((self._active, self._selected), target, t)
+            self._stood_s, self._then = np.inf, self._selected
         tick, challenge = int(packet["tick"]), int(packet["challenge"])
         proposal = Proposal(
-            tick, complement(challenge), np.asarray(target, np.float64), age_s, fault
+            tick,
+            complement(challenge),
+            np.asarray(target, np.float64),
+            told.age_s,
+            fault,
         )
-        return encode_answer(proposal, command, self._active)
+        return encode_answer(proposal, inputs, self._active)
 
     def _rest(self, packet: np.void) -> None:
         """Everything starts afresh at the targets on the wire."""
         self._moments.clear()
-        self._ramp, self._upright_s, self._reference = None, np.inf, None
+        self.sources.rest()
+        self._ramp, self._held = None, False
+        self._stood_s = self._upright_s = np.inf
         selected = int(packet["policy"])
         if 0 <= selected < len(self._controllers):
             self._active = self._selected = selected
         if np.isfinite(packet["target"]).all():
             self._controllers[self._active].reset(packet["target"])
 
-    def _select(self, number: int, target: Array) -> None:
+    def _select(self, number: int, target: Array, t: float) -> None:
+        """Goes to another policy, by a ramp where it stands in another way."""
         if not 0 <= number < len(self._controllers):
             return
         self._selected = number
-        self._ramp, self._upright_s = None, np.inf
-        self._hand_over(number, target)
+        self._stood_s = self._upright_s = np.inf
+        stances = [
+            np.asarray(self._interface(k).initial_target_rad)
+            for k in (self._active, number)
+        ]
+        apart = np.abs(stances[1] - stances[0]).max()
+        if self._ramp is None and apart <= SAME_STANCE_RAD:
+            self._hand_over(number, target)
+        elif self._ramp is None:
+            self._stood_s = t + STAND_S
+        else:
+            self._settle((self._active, number), target, t)
+            self._then = number
+
+    def _settle(self, stances: tuple[int, ...], target: Array, t: float) -> None:
+        """Begins the ramp to the first of these policies' stances."""
+        interface = self._interface(stances[0])
+        self._ramp = settle_ramp(t, target, interface.initial_target_rad, interface)
+        self._stances = stances[1:]
 
     def _hand_over(self, number: int, target: Array) -> None:
         controller = self._controllers[number]
-        interface = controller.bundle.manifest.interface
         history, action = build_history(
-            tuple(self._moments), interface, controller.assembler
+            tuple(self._moments), self._interface(number), controller.assembler
         )
         controller.resume(history, action, target)
-        self._active = number
+        self._active, self._held = number, False
 
-    def _command(self, quat: Array, t: float) -> tuple[NDArray[np.float32], float]:
-        ranges = self._ranges(self._active)
-        size = len(ranges)
-        if len(self._state.value) != size:
-            value = resized(self._state.value, size)
-            self._state = CommandState(np.asarray(value, np.float64), self._state.t_s)
-        frame = self._source.poll(t)
-        if size == 0:
-            return np.zeros(0, np.float32), 0.0
-        self._state, age_s = command_step(self._state, frame, t, ranges)
-        command = self._state.value.astype(np.float32)
-        if self._hold is not None and size == _YAW + 1 and np.isfinite(quat).all():
-            v_quat = self._controllers[self._active].bundle.manifest.interface.v_quat_b
-            yaw = heading(multiply(quat, v_quat))
-            self._reference, rate = heading_step(
-                self._reference, yaw, float(command[_YAW]), self._hold
-            )
-            command[_YAW] = rate
-        return command, age_s
-
-    def _ranges(self, number: int) -> tuple[tuple[float, float], ...]:
-        return self._controllers[number].bundle.manifest.interface.command_ranges
+    def _interface(self, number: int) -> Interface:
+        return self._controllers[number].bundle.manifest.interface
 
     def _run(
-        self, packet: np.void, command: NDArray[np.float32]
+        self, packet: np.void, told: Told, inputs: NDArray[np.float32]
     ) -> tuple[Array, PolicyFault]:
+        if self._held:
+            self._hand_over(self._active, packet["target"])
         controller = self._controllers[self._active]
         down = gravity(packet["quat"])
-        step = controller.step(packet["pos"], down, packet["gyro"], command)
+        step = controller.step(packet["pos"], down, packet["gyro"], inputs)
         target = step.astype(np.float64)
         if controller.faults:
             bad = controller.fault == "non-finite measurement"
             return target, PolicyFault.OBSERVATION if bad else PolicyFault.OUTPUT
-        asked = asked_for(controller.action, controller.bundle.manifest.interface)
-        self._keep(packet, command, asked)
+        asked = asked_for(controller.action, self._interface(self._active))
+        self._keep(packet, told, asked)
         return target, PolicyFault.NONE
 
-    def _keep(self, packet: np.void, command: NDArray, asked_rad: Array) -> None:
+    def _keep(self, packet: np.void, told: Told, asked_rad: Array) -> None:
         down = gravity(packet["quat"])
         self._moments.append(
-            Moment(packet["pos"], down, packet["gyro"], command, asked_rad)
+            Moment(packet["pos"], down, packet["gyro"], told.given, asked_rad)
         )
 
     def _look_for_upright(self, packet: np.void, target: Array, t: float) -> None:
         """Recovery is over once the hand is upright: settle, then the first policy."""
         manifest = self._controllers[self._active].bundle.manifest
-        if manifest.task != RECOVERY:
+        if manifest.task != RECOVERY or self._stood_s < np.inf:
             return
         tilt = tilt_angle(packet["quat"], manifest.interface.v_quat_b)
         speed = float(np.linalg.norm(packet["gyro"]))
         self._upright_s, upright = upright_step(self._upright_s, tilt, speed, t)
         if upright:
-            goal = self._controllers[0].bundle.manifest.interface.initial_target_rad
-            self._ramp = settle_ramp(t, target, goal, manifest.interface)
+            self._settle((0,), target, t)
+            self._then = 0 if self._active != 0 else None
 
-    def _follow_ramp(self, packet: np.void, command: NDArray, t: float) -> Array:
-        ramp = self._ramp
-        assert ramp is not None
+    def _follow_ramp(self, ramp: Ramp, packet: np.void, told: Told, t: float) -> Array:
         target = ramp.target(t)
-        self._keep(packet, command, target - packet["target"])
-        if ramp.over(t) and self._active != 0:
+        self._keep(packet, told, target - packet["target"])
+        if ramp.over(t) and self._stances:
+            self._settle(self._stances, target, t)
+        elif ramp.over(t) and self._then is not None:
             self._ramp, self._upright_s = None, np.inf
-            self._hand_over(0, target)
+            self._hand_over(self._then, target)
         return target

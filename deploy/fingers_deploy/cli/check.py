@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from fingers_deploy.behaviour.task_inputs import OBJECT_TERMS, reads
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
+from fingers_deploy.manifest import Interface
 from fingers_deploy.observation import input_size
 from fingers_deploy.policy import Runtime
 
@@ -68,6 +70,8 @@ def _describe(bundle: Bundle) -> None:
     print(f"self-test       {len(manifest.parity.obs)} known answers right")
     print(f"observation     {terms}")
     print(f"command         {_ranges(interface.command_ranges)}")
+    for option in sources_needed(interface):
+        print(f"told by         {option}")
     print(
         f"action          {interface.action.scale_rad:g} rad per step, "
         f"output within ±{interface.action.clip:g}"
@@ -77,6 +81,15 @@ def _describe(bundle: Bundle) -> None:
         f"{chain.lowpass_hz} Hz, joint speed {_speeds(chain.slews_rad_s)}"
     )
     print(f"joints          {', '.join(interface.joint_names)}")
+
+
+def sources_needed(interface: Interface) -> list[str]:
+    """Options of `run` for what a policy is told beside a command."""
+    options = {
+        ("request",): "--keys or typed `keys …`; key events: --keyboard DEVICE",
+        OBJECT_TERMS: "--tracker PATH, a camera's samples",
+    }
+    return [words for terms, words in options.items() if reads(interface, terms)]
 
 
 def _speeds(limits_rad_s: tuple[float, ...]) -> str:

@@ -9,9 +9,10 @@ import time
 from collections.abc import Mapping
 from typing import Any
 
+from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.runtime.launcher import EXIT_PREFLIGHT, Launcher
 
-HELP = "type: arm, stop, clear, policy N, status, quit"
+HELP = "type: arm, stop, clear, policy N, keys NAME …, status, quit"
 REFUSED = 2  # exit status of a process that refuses its input
 _RETRY_S = 0.5
 _LONGEST = 4096  # characters of input that are taken at once
@@ -124,6 +125,9 @@ class Console:
             self._quit()
         elif word in ("arm", "stop", "clear") or _selects(word):
             self._launcher.send(word)
+        elif keys := _keys(word):
+            for key in keys:
+                self._launcher.send(f"key {key}")
         elif word:
             _say(HELP)
 
@@ -152,3 +156,9 @@ class Console:
 def _selects(word: str) -> bool:
     name, _, number = word.partition(" ")
     return name == "policy" and number.isdigit()
+
+
+def _keys(word: str) -> list[str]:
+    """The keys of `keys left up …`; none if that is not what was typed."""
+    first, *names = word.split() or [""]
+    return names if first == "keys" and all(n in ARROWS for n in names) else []

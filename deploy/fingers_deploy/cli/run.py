@@ -2,16 +2,15 @@
 
 import argparse
 import contextlib
-import importlib.util
 import math
-from pathlib import Path
 from typing import Any
 
+from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.cli.console import REFUSED, drive
+from fingers_deploy.cli.options import check_library, check_options, check_sources
 from fingers_deploy.drivers.open import KINDS, open_driver
 from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
-from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_deploy.runtime.guard import guard_hand
 
@@ -38,7 +37,16 @@ def add_run(commands: Any) -> None:
         metavar=("GAIN", "OFFSET"),
         help="hold the heading: gain [1/s], constant yaw rate [rad/s]",
     )
-    parser.set_defaults(command=run, plan=None)
+    parser.add_argument(
+        "--keys", nargs="+", choices=ARROWS, metavar="KEY", help="keyboard: to press"
+    )
+    parser.add_argument(
+        "--keyboard", metavar="DEVICE", help="keyboard: /dev/input/… of its key events"
+    )
+    parser.add_argument(
+        "--tracker", metavar="PATH", help="push: local socket for a camera's samples"
+    )
+    parser.set_defaults(command=run, plan=None, told=True)
 
 
 def add_record(commands: Any) -> None:
@@ -51,7 +59,15 @@ def add_record(commands: Any) -> None:
     _add_driver(parser)
     _add_loop(parser)
     parser.set_defaults(
-        command=run, runtime="numpy", joystick=None, sticks=[], heading_hold=None
+        command=run,
+        runtime="numpy",
+        joystick=None,
+        sticks=[],
+        heading_hold=None,
+        keys=None,
+        keyboard=None,
+        tracker=None,
+        told=False,
     )
 
 
@@ -65,9 +81,11 @@ def add_guard(commands: Any) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Runs or records; returns the exit status."""
-    _check(options)
+    check_options(options)
     # Refused here, before any process starts and any device is opened.
     bundles = [load_bundle(path) for path in options.bundles]
+    if options.told:
+        check_sources(options, bundles)
     driver = _driver(options)
     with contextlib.ExitStack() as stack:
         if options.driver == "sim" and not options.socket:
@@ -87,6 +105,9 @@ def run(options: argparse.Namespace) -> int:
             "joystick": options.joystick,
             "sticks": options.sticks,
             "plan": options.plan,
+            "keys": options.keys,
+            "keyboard": options.keyboard,
+            "tracker": options.tracker,
             "heading_hold": heading
             and {"gain": heading[0], "offset_rad_s": heading[1]},
         }
@@ -109,7 +130,7 @@ def _tell_distance(socket: str, interface: Interface) -> None:
 def guard(options: argparse.Namespace) -> int:
     """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
     interface = load_bundle(options.bundles[0]).manifest.interface
-    _check_library(options.driver)
+    check_library(options.driver)
     safe, words = guard_hand(lambda: open_driver(_driver(options), interface))
     print(words)
     return 0 if safe else 5
@@ -172,32 +193,3 @@ def _driver(options: argparse.Namespace) -> dict[str, Any]:
         "imu_address": options.imu_address,
         "imu_mount": options.imu_mount,
     }
-
-
-def _check(options: argparse.Namespace) -> None:
-    kind = options.driver
-    if kind == "sim" and not (options.model or options.socket):
-        raise InputError("--driver sim", "", "no model", "--model FILE or --socket")
-    if kind == "replay" and not options.log:
-        raise InputError("--driver replay", "", "no log", "--log FILE")
-    if options.arm and kind == "wuji" and not options.dry_run:
-        valid = "typing arm at the console"
-        raise InputError("--arm", "", "a real hand", valid)
-    _check_library(kind)
-    if not 50.0 <= options.loop_hz <= 1000.0:
-        raise InputError("--loop-hz", "", options.loop_hz, "50 to 1000")
-    if not all(abs(stick) <= 1.0 for stick in options.sticks):
-        raise InputError("--sticks", "", options.sticks, "numbers from -1 to 1")
-    hold = options.heading_hold or ()
-    if not all(map(math.isfinite, hold)):
-        raise InputError("--heading-hold", "", hold, "finite numbers")
-    if options.duration is not None and not options.duration > 0:
-        raise InputError("--duration", "", options.duration, "above 0 s")
-    if not options.no_record and not Path(options.out).is_dir():
-        raise InputError("--out", "", options.out, "an existing folder")
-
-
-def _check_library(kind: str) -> None:
-    if kind == "wuji" and importlib.util.find_spec("wujihandpy") is None:
-        valid = "pip install wujihandpy, or the extra [hand]"
-        raise InputError("--driver wuji", "", "no wujihandpy", valid)

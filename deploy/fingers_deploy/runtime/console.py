@@ -2,8 +2,10 @@
 
 import json
 import socket
+from collections import deque
 from typing import Any
 
+from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.safety.types import Operator
 
 _LONGEST = 65536
@@ -22,6 +24,7 @@ class ConsoleLink:
         end.setblocking(False)
         self.quitting = False
         self.selected: int | None = None
+        self.keys: deque[int] = deque()
 
     def poll(self) -> Operator:
         """Returns the newest action; a stop outlasts whatever was typed after it.
@@ -44,6 +47,8 @@ class ConsoleLink:
                 self.quitting, action = True, Operator.STOP
             elif word.startswith("policy ") and word[7:].isdigit():
                 self.selected = int(word[7:])
+            elif word.startswith("key ") and word[4:] in ARROWS:
+                self.keys.append(ARROWS.index(word[4:]))
             else:
                 asked = ACTIONS.get(word, action)
                 action = action if action == Operator.STOP else asked

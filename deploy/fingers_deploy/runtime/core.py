@@ -1,6 +1,7 @@
 """One step of the supervisor's process: read, judge, write, tell the policy, record."""
 
 import time
+from collections import deque
 from collections.abc import Callable
 from typing import Protocol
 
@@ -87,6 +88,9 @@ class Core:
         self.stats = LoopStats()
         self.checks: tuple[Check, ...] = ()
         self.selected = 0
+        self.keys: deque[int] = (
+            deque()
+        )  # that the operator asks for, the next one first
         self._write_error = ""
         self._sent: dict[int, float] = {}
         self._row = empty_row()
@@ -209,6 +213,7 @@ class Core:
         packet["gyro"] = np.nan if imu is None else imu.gyro_b
         packet["target"] = self.state.target_rad
         packet["runs"], packet["policy"] = out.policy_runs, self.selected
+        packet["key"] = self.keys.popleft() + 1 if self.keys else 0
         self._sent = {control: t}
         self._link.send(packet)
 

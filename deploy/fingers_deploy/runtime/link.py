@@ -23,10 +23,12 @@ OBSERVATION = np.dtype(
         ("target", "<f8", (JOINT_COUNT,)),
         ("runs", "<i4"),
         ("policy", "<i4"),
+        ("key", "<i4"),
     ]
 )
 """Supervisor to policy: measurements, targets on the wire, whether the policy runs, and
-which policy the operator has selected."""
+which policy the operator has selected; `key` is one more than the place of a key that
+the operator asks for now, 0 for none."""
 
 ANSWER = np.dtype(
     [

@@ -1,5 +1,6 @@
 """The policy's process: observations in, proposals out, nothing else."""
 
+import contextlib
 import json
 import select
 import socket
@@ -12,11 +13,16 @@ import numpy as np
 from fingers_deploy.behaviour.command import CommandSource, FixedCommand
 from fingers_deploy.behaviour.heading import HeadingConfig
 from fingers_deploy.behaviour.joystick import Joystick
+from fingers_deploy.behaviour.key_runner import KeyRunner
+from fingers_deploy.behaviour.keyboard import Keyboard
 from fingers_deploy.behaviour.plan import Plan, read_plan
 from fingers_deploy.behaviour.policies import Policies
+from fingers_deploy.behaviour.task_inputs import OBJECT_TERMS, reads
+from fingers_deploy.behaviour.tracker_port import TrackerPort
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.errors import InputError
+from fingers_deploy.manifest import Interface
 from fingers_deploy.runtime.link import OBSERVATION
 from fingers_deploy.runtime.realtime import PRIORITY, prefer_this_process
 from fingers_deploy.runtime.signals import ignore_interrupts
@@ -29,8 +35,9 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
 
     Args:
         options: `bundles` (paths), `runtime`, `sticks` (fixed positions) or `joystick`
-            (device), `heading_hold` (gain and offset) or None; `plan` (file of targets
-            that are played in the place of a policy) or None.
+            (device), `heading_hold` (gain and offset) or None; `keys` (names),
+            `keyboard` (device) and `tracker` (path of a socket) or None; `plan` (file
+            of targets that are played in the place of a policy) or None.
 
     Raises:
         InputError: a bundle or a device is refused.
@@ -47,13 +54,25 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
         source = Joystick(options["joystick"])
     else:
         source = FixedCommand(tuple(options.get("sticks") or ()))
-    ranges = controllers[0].bundle.manifest.interface.command_ranges
-    hold = options.get("heading_hold")
+    interfaces = [c.bundle.manifest.interface for c in controllers]
+    hold, ranges = options.get("heading_hold"), interfaces[0].command_ranges
     config = None
     if hold is not None and len(ranges) == 3:
         low, high = ranges[2]
         config = HeadingConfig(hold["gain"], hold["offset_rad_s"], low, high)
-    return Policies(controllers, source, config)
+    device = options.get("keyboard")
+    keys = KeyRunner(tuple(options.get("keys") or ()), device and Keyboard(device))
+    return Policies(controllers, source, config, keys, _tracker(options, interfaces))
+
+
+def _tracker(
+    options: Mapping[str, Any], interfaces: Sequence[Interface]
+) -> TrackerPort | None:
+    """Opens the socket of a camera, where a policy reads what it tells."""
+    readers = [x for x in interfaces if reads(x, OBJECT_TERMS)]
+    if not readers or not options.get("tracker"):
+        return None
+    return TrackerPort(options["tracker"], readers[0].v_quat_b)
 
 
 def serve(link: socket.socket, policies: Policies | Plan) -> None:
@@ -95,6 +114,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 2
     prefer_this_process(PRIORITY - 10, ask=bool(options["realtime"]))
     serve(link, policies)
+    for line in policies.finish():
+        # A terminal that is gone is no reason to fail.
+        with contextlib.suppress(OSError):
+            print(line, flush=True)
     return 0
 
 

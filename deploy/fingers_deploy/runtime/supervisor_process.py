@@ -29,7 +29,6 @@ STATUS_S = 0.2
 _SHARED = (
     "joint_names",
     "control_rate_hz",
-    "v_quat_b",
     "command_path.delay_s",
     "command_path.lowpass_hz",
 )
@@ -120,6 +119,7 @@ class Supervisor:
                 operator = self._console.poll()
                 if self._console.selected is not None:
                     self._core.selected = self._console.selected
+                self._core.keys = self._console.keys
                 if self._console.quitting and self._core.state.mode in ENERGIZED:
                     operator = Operator.STOP
                 out = self._core.tick(tick, operator)

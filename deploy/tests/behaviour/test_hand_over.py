@@ -133,7 +133,7 @@ def test_no_history_at_all_is_an_episode_start(bundle):
     interface = bundle.manifest.interface
     history, action = build_history((), interface, controller.assembler)
     assert history is None and not action.any()
-    moment = Moment(np.zeros(20), np.zeros(3), np.zeros(3), np.zeros(1), np.zeros(20))
+    moment = Moment(np.zeros(20), np.zeros(3), np.zeros(3), {}, np.zeros(20))
     history, _ = build_history((moment,), interface, controller.assembler)
     assert all(np.ptp(part, axis=0).max() == 0 for part in history)
 

@@ -2,6 +2,7 @@ import contextlib
 import json
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from fuzz_bundles import measure as damage_bundles
 from fingers_deploy.cli.main import main
 from fingers_deploy.record import read_log
 from fingers_deploy.safety import Mode
+from fingers_mjx.bundle import write_bundle
 
 
 def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
@@ -53,6 +55,9 @@ SIM = ("--driver", "sim", "--model", "x")
         (["run", "BUNDLE", *SIM, "--heading-hold", "inf", "0"], "finite"),
         (["run", "BUNDLE", *SIM, "--duration", "-1"], "above 0"),
         (["run", "BUNDLE", *SIM, "--out", "nowhere"], "existing folder"),
+        (["run", "BUNDLE", *SIM, "--keys", "up"], "a keyboard policy"),
+        (["run", "BUNDLE", *SIM, "--keyboard", "/dev/none"], "a keyboard policy"),
+        (["run", "BUNDLE", *SIM, "--tracker", "t"], "no policy that reads a camera"),
         (["run", "BUNDLE", "--driver", "sim", "--model", "nowhere.xml"], "nowhere.xml"),
         (["log", "nowhere"], "nowhere"),
     ],
@@ -145,14 +150,16 @@ def test_a_recording_replays_as_a_dry_run(recorded, marching_dir, tmp_path):
     assert done.returncode in (0, 5, 6)
 
 
-def test_the_policy_of_another_hand_order_is_refused_by_the_supervisor(
-    hand_model, marching_dir, bundle_dir
+def test_policies_for_other_filters_are_refused_by_the_supervisor(
+    hand_model, marching_dir, bundle_factory, interface, tmp_path
 ):
     """Two bundles that cannot be switched between: nothing starts."""
-    arguments = ["run", marching_dir, bundle_dir, "--driver", "sim"]
+    path = replace(interface.command_path, lowpass_hz=5.0)
+    write_bundle(tmp_path, bundle_factory(replace(interface, command_path=path)))
+    arguments = ["run", marching_dir, tmp_path, "--driver", "sim"]
     done = _run(*arguments, "--model", hand_model, "--no-record", "--arm")
     assert done.returncode == 2
-    assert "interface.v_quat_b" in done.stderr
+    assert "command_path.lowpass_hz" in done.stderr
     assert "Traceback" not in done.stderr
 
 
