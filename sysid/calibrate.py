@@ -26,6 +26,8 @@ from sysid.data import MeasuredLog
 from sysid.diagnosis import Estimate
 from sysid.mechanism import Mechanism
 
+_PULL = ("source", "finger", "normal_n", "friction", "deviation", "start_s", "stop_s")
+
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
@@ -61,7 +63,7 @@ class Calibration:
         data = {
             "shared": {k: dataclasses.asdict(v) for k, v in self.shared.items()},
             "joints": joints,
-            "pulls": [dataclasses.asdict(pull) for pull in self.pulls],
+            "pulls": [{n: getattr(p, n) for n in _PULL} for p in self.pulls],
             "log_sha256": list(self.log_sha256),
         }
         return json.dumps(_without_nan(data), indent=2, allow_nan=False)

@@ -1,4 +1,4 @@
-"""Pictures of a calibration: every joint's trajectory, and Table I with intervals."""
+"""Pictures of a calibration: trajectories of joints, pulls, and Table I."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ _PANELS = ("angle [rad]", "effort [N·m]")
 
 
 def write_figures(found: Calibration, folder: Path) -> list[Path]:
-    """Draws one picture per joint and one of all figures.
+    """Draws one picture per joint, one of all pulls and one of all figures.
 
     Raises:
         ModuleNotFoundError: matplotlib, of the optional dependencies `viz`, is missing.
@@ -23,6 +23,8 @@ def write_figures(found: Calibration, folder: Path) -> list[Path]:
     paths = [
         _joint(fit, folder / f"{joint}.png") for joint, fit in found.joints.items()
     ]
+    if found.pulls:
+        paths.append(_pulls(found, folder / "pulls.png"))
     return [*paths, _table(found, folder / "table1.png")]
 
 
@@ -37,7 +39,7 @@ def _joint(fit: JointFit, path: Path) -> Path:
     for row, i in enumerate(logged):
         measured = np.where(record.valid[:, i], record.measured[:, i], np.nan)
         top, rest = axes[2 * row], axes[2 * row + 1]
-        top.plot(record.t_s, measured, color=_MEASURED, lw=0.8, label="measured")
+        top.plot(record.t_s, measured, color=_MEASURED, lw=2.2, label="measured")
         top.plot(
             record.t_s, simulated[:, i], color=_SIMULATED, lw=0.8, label="simulated"
         )
@@ -53,6 +55,26 @@ def _joint(fit: JointFit, path: Path) -> Path:
         fontsize=9,
     )
     axes[-1].set_xlabel("time [s]")
+    figure.savefig(path, dpi=110)
+    return path
+
+
+def _pulls(found: Calibration, path: Path) -> Path:
+    """Pull over normal force, with the time in which the tip slid."""
+    from matplotlib.figure import Figure
+
+    figure = Figure((8.0, 3.5), layout="constrained")
+    axes = figure.subplots()
+    for pull in found.pulls:
+        name = f"{pull.finger}, {pull.normal_n:g} N: {pull.friction:.3f}"
+        (line,) = axes.plot(pull.t_s, pull.ratio, lw=0.8, label=name)
+        span = (pull.start_s, pull.stop_s)
+        axes.plot(span, [pull.friction] * 2, color=line.get_color(), lw=3)
+    mean = found.shared["tip_friction"]
+    axes.axhspan(mean.low, mean.high, color="0.85", zorder=0)
+    axes.set_xlabel("time [s]")
+    axes.set_ylabel("pull / normal force")
+    axes.legend(frameon=False, loc="lower center")
     figure.savefig(path, dpi=110)
     return path
 

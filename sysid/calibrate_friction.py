@@ -7,6 +7,7 @@ a load cell tells the pull. While it slides, μ_k = F_pull / F_normal.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from envs.errors import InputError
 from sysid.data import MeasuredLog
@@ -21,7 +22,7 @@ _LEAST_ROWS = 20
 _BLOCKS = 10
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Pull:
     """One pull.
 
@@ -32,6 +33,7 @@ class Pull:
         deviation: of that mean, from blocks of consecutive rows.
         start_s, stop_s: when it slid [s].
         source: the log.
+        t_s, ratio: all readings, pull / normal force.
     """
 
     finger: str
@@ -41,6 +43,8 @@ class Pull:
     start_s: float
     stop_s: float
     source: str
+    t_s: Float[np.ndarray, " n"]
+    ratio: Float[np.ndarray, " n"]
 
 
 def is_pull(log: MeasuredLog) -> bool:
@@ -79,6 +83,8 @@ def pull_of(log: MeasuredLog) -> Pull:
         start_s=float(t_s[rows][0]),
         stop_s=float(t_s[rows][-1]),
         source=log.source,
+        t_s=t_s,
+        ratio=np.abs(force) / normal,
     )
 
 
