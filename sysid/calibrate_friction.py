@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import uniform_filter1d
 
 from envs.errors import InputError
 from sysid.data import MeasuredLog
@@ -18,6 +19,7 @@ SETTING = "normal_n"
 
 _SLIDING_SHARE = 0.5
 _START, _END = 0.2, 0.05
+_CHATTER_S = 0.2
 _LEAST_ROWS = 20
 _BLOCKS = 10
 
@@ -55,9 +57,10 @@ def is_pull(log: MeasuredLog) -> bool:
 def pull_of(log: MeasuredLog) -> Pull:
     """Reads the friction from a pull.
 
-    The tip slides in the longest time with at least half of the usual pull; the first
-    fifth of it is left out, for it holds the build-up and the breakaway peak, which
-    belong to static friction, and the last twentieth for the release.
+    The tip slides in the longest time with at least half of the usual pull, averaged
+    over a fifth of a second, for a tip that chatters on its spring slides all the same;
+    the first fifth of it is left out, for it holds the build-up and the breakaway peak,
+    which belong to static friction, and the last twentieth for the release.
 
     Raises:
         InputError: no load cell, no normal force, or a tip that never slides.
@@ -71,7 +74,8 @@ def pull_of(log: MeasuredLog) -> Pull:
         valid = "one column force.<finger> with the pull"
         raise InputError(log.source, "columns", ", ".join(cells) or "none", valid)
     t_s, force = log.samples(f"force.{cells[0]}")
-    rows = _sliding(log.source, cells[0], np.abs(force))
+    width = max(1, round(_CHATTER_S / np.median(np.diff(t_s)))) if len(t_s) > 1 else 1
+    rows = _sliding(log.source, cells[0], uniform_filter1d(np.abs(force), width))
     ratio = np.abs(force[rows]) / normal
     blocks = [np.mean(part) for part in np.array_split(ratio, _BLOCKS)]
     deviation = float(np.std(blocks, ddof=1) / np.sqrt(_BLOCKS))
