@@ -11,6 +11,7 @@ from fingers_deploy.cli.console import REFUSED, drive
 from fingers_deploy.cli.options import check_library, check_options, check_sources
 from fingers_deploy.drivers.open import KINDS, open_driver
 from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
+from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_deploy.runtime.guard import guard_hand
 
@@ -131,6 +132,8 @@ def guard(options: argparse.Namespace) -> int:
     """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
     interface = load_bundle(options.bundles[0]).manifest.interface
     check_library(options.driver)
+    if options.driver == "sim" and not options.socket:
+        raise InputError("--driver sim", "", "no hand", "--socket PATH of a simulator")
     safe, words = guard_hand(lambda: open_driver(_driver(options), interface))
     print(words)
     return 0 if safe else 5

@@ -28,6 +28,11 @@ class DryRun:
         info = self._driver.info
         return dataclasses.replace(info, name=f"{info.name} (dry run)")
 
+    @property
+    def over(self) -> bool:
+        """As the driver's."""
+        return self._driver.over
+
     def read(self) -> Reading | None:
         """As the driver's."""
         return self._driver.read()

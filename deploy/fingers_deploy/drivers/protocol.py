@@ -35,6 +35,11 @@ class Driver(Protocol):
         """What does not change while the driver is open."""
         ...
 
+    @property
+    def over(self) -> bool:
+        """Nothing more will come: a recording that has ended, never a hand."""
+        ...
+
     def read(self) -> Reading | None:
         """Returns the newest sample of the joints; None before the first."""
         ...

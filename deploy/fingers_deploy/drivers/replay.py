@@ -49,8 +49,8 @@ class ReplayDriver:
         )
 
     @property
-    def done(self) -> bool:
-        """The log is over."""
+    def over(self) -> bool:
+        """The log has ended."""
         return self._clock() - self._start_s > self._times[-1]
 
     def read(self) -> Reading:

@@ -37,7 +37,7 @@ class SimDriver:
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.connect(str(path))
         self._socket.setblocking(lockstep)
-        self._lockstep = lockstep
+        self._lockstep, self.over = lockstep, False
         self._state: np.void | None = None
         self.info = DriverInfo(
             name=f"simulated hand at {path}",

@@ -54,7 +54,7 @@ class WujiDriver:
         serial: str | None = None,
     ):
         _check_names(interface)
-        self._imu = imu
+        self._imu, self.over = imu, False
         self._controller: Any = None
         self._hand = library.Hand(serial_number=serial)
         self._hand.disable_thread_safe_check()

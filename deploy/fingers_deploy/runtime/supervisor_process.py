@@ -129,6 +129,10 @@ class Supervisor:
                     self._console.tell(self._status(realtime, out.events, out.alarm))
                 if self._console.quitting and out.alarm:
                     return 5
+                if self._driver.over:
+                    over = (*out.events, "the recording is over")
+                    self._console.tell(self._status(realtime, over, alarm=False))
+                    break
         finally:
             self._close(realtime)
         return 5 if tripped - {"OP"} else 0

@@ -60,6 +60,7 @@ SIM = ("--driver", "sim", "--model", "x")
         (["run", "BUNDLE", *SIM, "--tracker", "t"], "no policy that reads a camera"),
         (["run", "BUNDLE", "--driver", "sim", "--model", "nowhere.xml"], "nowhere.xml"),
         (["log", "nowhere"], "nowhere"),
+        (["guard", "BUNDLE", *SIM], "--socket"),
     ],
 )
 def test_bad_input_is_one_sentence_and_status_2(bundle_dir, capsys, arguments, words):
@@ -145,9 +146,13 @@ def test_a_recording_converts_to_csv(recorded, tmp_path, capsys):
 def test_a_recording_replays_as_a_dry_run(recorded, marching_dir, tmp_path):
     _, file = recorded
     arguments = ["run", marching_dir, "--driver", "replay", "--log", file, "--arm"]
-    done = _run(*arguments, "--wiggle", "none", "--duration", "3", "--out", tmp_path)
+    done = _run(*arguments, "--wiggle", "none", "--out", tmp_path)
     assert "Traceback" not in done.stderr
-    assert done.returncode in (0, 5, 6)
+    # A loaded machine may be too late for its own log.
+    assert done.returncode == 0 or "fault" in done.stdout
+    # It ends with its log, without an alarm for a hand that is not there.
+    assert "the recording is over" in done.stdout
+    assert "BATTERY" not in done.stdout
 
 
 def test_policies_for_other_filters_are_refused_by_the_supervisor(

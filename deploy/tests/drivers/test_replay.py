@@ -33,7 +33,7 @@ def test_plays_at_its_own_pace(interface):
         assert reading.pos_rad[4] == pytest.approx(0.01 * k)
         assert clock.t - reading.t_s == pytest.approx(late, abs=1e-6)
         assert driver.imu().t_s == reading.t_s
-    assert driver.done and driver.health().bus_v == 14.5
+    assert driver.over and driver.health().bus_v == 14.5
 
 
 def test_is_never_live_and_only_pretends_power(interface):
