@@ -12,6 +12,7 @@ from envs.errors import InputError
 from sysid.data import LogHeader, MeasuredLog
 
 METADATA_KEY = b"fingers.measured_log"
+DIGEST_KEY = b"fingers.measured_log.sha256"
 MAX_CELLS = 500_000_000
 _VALID = "a Parquet file with numeric columns"
 
@@ -20,7 +21,8 @@ def read_parquet(path: Path) -> MeasuredLog:
     """Reads a log from Parquet.
 
     Raises:
-        InputError: not such a file.
+        InputError: not such a file, or its contents are not those that `write_parquet`
+            wrote (files of other programs carry no digest).
         ModuleNotFoundError: pyarrow, of the optional dependencies `data`, is missing.
     """
     import pyarrow
@@ -30,7 +32,8 @@ def read_parquet(path: Path) -> MeasuredLog:
         # `open` keeps to this one file: a path given to pyarrow may name a data set.
         with open(path, "rb") as stream:
             file = pyarrow.parquet.ParquetFile(stream)
-            header = _header(path, file.schema_arrow.metadata or {})
+            metadata = file.schema_arrow.metadata or {}
+            header = _header(path, metadata)
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= MAX_CELLS:
                 raise InputError(path, "", f"{cells} cells", f"at most {MAX_CELLS}")
@@ -40,7 +43,12 @@ def read_parquet(path: Path) -> MeasuredLog:
     if "t" not in columns:
         raise InputError(path, "columns", ", ".join(columns), "a column t [s]")
     key, t_s = columns.pop("key", None), columns.pop("t")
-    return MeasuredLog(header, t_s, columns, key, str(path))
+    log = MeasuredLog(header, t_s, columns, key, str(path))
+    digest = metadata.get(DIGEST_KEY, log.sha256.encode())
+    if digest != log.sha256.encode():
+        valid = "what was written; copy the file again"
+        raise InputError(path, "sha256", "other contents", valid)
+    return log
 
 
 def write_parquet(log: MeasuredLog, path: Path) -> None:
@@ -57,7 +65,9 @@ def write_parquet(log: MeasuredLog, path: Path) -> None:
     if log.key is not None:
         columns["key"] = pyarrow.array(log.key.tolist(), pyarrow.string())
     header = json.dumps(to_dict(log.header), ensure_ascii=False).encode()
-    table = pyarrow.table(columns).replace_schema_metadata({METADATA_KEY: header})
+    table = pyarrow.table(columns).replace_schema_metadata(
+        {METADATA_KEY: header, DIGEST_KEY: log.sha256.encode()}
+    )
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         pyarrow.parquet.write_table(table, part)
