@@ -21,8 +21,8 @@ class InputTerm:
         size: entries of one sample.
         frame: frame in which they are expressed.
         unit: their unit.
-        ranges: lowest and highest value of each entry in training, for a command that an
-            operator gives; empty for one that is measured.
+        ranges: lowest and highest value of each entry in training, for a command that
+            an operator steers; empty for any other.
     """
 
     name: str

@@ -7,10 +7,12 @@ from typing import Any
 import flax.struct
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from envs.base import State
 from envs.commands import CommandConfig, sample_command
+from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.hand_env import HandEnv
@@ -35,6 +37,9 @@ from envs.scoring import check_weights
 from envs.signals import Signals
 from envs.streams import stream
 from rewards import RECOVERY, RewardTable
+
+PALM_MIDDLE_B = np.array(figures().palm.inertial_pos)
+"""Centre of mass of the palm in the palm frame, whose origin is at the wrist [m]."""
 
 
 def _no_command() -> CommandConfig:
@@ -166,10 +171,11 @@ class Recovery(BareTask):
     ) -> tuple[Memory, dict[str, Array]]:
         """What the goals compare: gravity in V, height, and both of the stance."""
         del valid  # no memory of a reward
+        up_b = unrotate(jnp.array(self.stance.root_quat_w), jnp.array([0.0, 0.0, 1.0]))
         return memory, {
             "gravity_v": self._gravity_v(signals),
-            "height_m": signals.palm_pos_w[2],
-            "stance_height_m": jnp.array(self.stance.root_pos_w[2]),
+            "height_m": signals.palm_pos_w[2] - PALM_MIDDLE_B @ signals.gravity_b,
+            "stance_height_m": self.stance.root_pos_w[2] + PALM_MIDDLE_B @ up_b,
             "stance_joint_pos": jnp.array(self.stance.joint_pos_rad),
         }
 

@@ -71,7 +71,7 @@ from rewards.recovery_table import RECOVERY
 from rewards.schedules import Constant, GeometricDecay, Schedule, StepSwitch
 from rewards.shaping import safe_norm, smoothstep, tracking_kernel
 from rewards.smoothness import action_rate
-from rewards.stance import palm_tilt, stance_height, stance_pose
+from rewards.stance import level_height, palm_tilt, stance_height, stance_pose
 from rewards.tables import CRAWL, STOCK
 from rewards.tracking import track_planar_velocity, track_yaw_rate
 
@@ -107,6 +107,7 @@ __all__ = [
     "is_commanded",
     "joint_acceleration",
     "keys_touched",
+    "level_height",
     "lift_frequency_hz",
     "lift_gate",
     "lift_step",

@@ -1,12 +1,14 @@
 """Reward table of fall recovery.
 
-The rows bind attributes of `envs.signals.Signals` and four extras that the caller adds:
-`gravity_v`, the unit vector of gravity in V, `height_m`, the height of the palm, and
-`stance_height_m` and `stance_joint_pos`, height and joint angles of the crawl stance.
+The rows bind attributes of `envs.signals.Signals` and four extras that the caller
+adds: `gravity_v`, the unit vector of gravity in V, `height_m`, the height of the palm's
+middle, and `stance_height_m` and `stance_joint_pos`, its height and the joint angles in
+the crawl stance.
 
-The paper names tilt, height and joint pose and gives no weight. All weights are ours:
-the three goals are of one size, and a fallen hand must be free to move, so rates and
-contacts of links, which it cannot avoid, cost little beside the crawl task's.
+The paper names tilt, height and joint pose and gives no weight. All weights are ours.
+Tilt alone costs little: a palm that lies flat, 39° from the stance, tilts further while
+its knuckles rise, before its wrist can. A fallen hand must be free to move, so rates
+and contacts of links, which it cannot avoid, cost little beside the crawl task's.
 """
 
 from rewards.compose import RewardTable, RewardTerm
@@ -14,11 +16,16 @@ from rewards.contact import undesired_contact
 from rewards.effort import joint_acceleration, torque
 from rewards.motion import roll_pitch_rate
 from rewards.smoothness import action_rate
-from rewards.stance import palm_tilt, stance_height, stance_pose
+from rewards.stance import level_height, palm_tilt, stance_pose
 
 RECOVERY: RewardTable = (
-    RewardTerm("palm_tilt", palm_tilt, -2.0, ("gravity_v",)),
-    RewardTerm("stance_height", stance_height, 1.0, ("height_m", "stance_height_m")),
+    RewardTerm("palm_tilt", palm_tilt, -0.2, ("gravity_v",)),
+    RewardTerm(
+        "stance_height",
+        level_height,
+        4.0,
+        ("height_m", "stance_height_m", "gravity_v"),
+    ),
     RewardTerm(
         "stance_pose", stance_pose, 2.0, ("joint_pos", "stance_joint_pos", "gravity_v")
     ),

@@ -9,6 +9,10 @@ HEIGHT_WIDTH_M = 0.10
 """Width of the height kernel [m]; ours. A palm on the floor is 0.1 m too low: with half
 of this width, rising from there would pay nothing."""
 
+RISING_WIDTH_M = 0.08
+"""Width of the height kernel of a hand that gets up [m]; ours. The middle of a palm on
+the floor is 0.08 m too low."""
+
 POSE_WIDTH_RAD = 0.5
 """Width of the pose kernel as a root mean square over the joints [rad]; ours."""
 
@@ -49,6 +53,36 @@ def stance_height(
         Paper, fall recovery (reaching the crawl-stance height); the shape is ours.
     """
     return tracking_kernel((height_m - stance_height_m)[None], width_m)
+
+
+def level_height(
+    height_m: Float[Array, ""],
+    stance_height_m: Float[Array, ""],
+    gravity_v: Float[Array, "3"],
+    width_m: Scalar = RISING_WIDTH_M,
+) -> Float[Array, ""]:
+    """Closeness to the stance's height of a hand that gets up, l² exp(−(z − z*)²/w²).
+
+    l = (1 + cos θ)/2 = (1 − g_z)/2 is 1 when level and 1/2 on the side. Without it, a
+    hand on its side, whose middle is high, is paid for staying there; with the origin
+    of the palm at the wrist in the place of its middle, one that lies flat is paid for
+    no way up, since the knuckles must rise before the wrist can.
+
+    Args:
+        height_m: height z of the palm's middle above the floor [m].
+        stance_height_m: its height z* in the stance [m].
+        gravity_v: unit vector of gravity in V.
+        width_m: w [m].
+
+    Returns:
+        Magnitude in [0, 1].
+
+    Source:
+        Paper, fall recovery (reaching the crawl-stance height); shape and gate are
+        ours.
+    """
+    level = 0.5 * (1.0 - gravity_v[2])
+    return level**2 * stance_height(height_m, stance_height_m, width_m)
 
 
 def stance_pose(

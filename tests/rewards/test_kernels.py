@@ -83,6 +83,9 @@ KERNELS = {
     "flat_orientation": Kernel(rewards.flat_orientation, (VELOCITY,), planar=(0,)),
     "palm_tilt": Kernel(rewards.palm_tilt, (VELOCITY,), 1.0, planar=(0,)),
     "stance_height": Kernel(rewards.stance_height, (((), 0.05), ((), 0.05)), 1.0),
+    "level_height": Kernel(
+        rewards.level_height, (((), 0.05), ((), 0.05), VELOCITY), 0.25, planar=(2,)
+    ),
     "stance_pose": Kernel(rewards.stance_pose, (JOINTS, JOINTS, VELOCITY), planar=(2,)),
 }
 

@@ -24,6 +24,15 @@ def test_height_falls_to_its_width():
     assert below == pytest.approx(np.exp(-1), rel=1e-5) == above
 
 
+def test_a_hand_that_rises_is_paid_for_height_as_far_as_it_is_level():
+    on_its_side = jnp.array([0.0, 1.0, 0.0])
+    at, below = jnp.array(0.108), jnp.array(0.028)
+    assert rewards.level_height(at, at, LEVEL) == 1.0
+    assert rewards.level_height(at, at, on_its_side) == pytest.approx(0.25)
+    assert rewards.level_height(at, at, UPSIDE_DOWN) == 0.0
+    assert rewards.level_height(below, at, LEVEL) == pytest.approx(np.exp(-1), rel=1e-5)
+
+
 def test_pose_is_a_mean_over_the_joints_and_needs_an_upright_hand():
     stance = jnp.linspace(-1, 1, 20)
     assert rewards.stance_pose(stance, stance, LEVEL) == pytest.approx(1.0)
