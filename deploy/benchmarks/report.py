@@ -1,7 +1,7 @@
 """One page from the results of the other measurements.
 
-Run `step_time.py`, `loop_timing.py`, `install_size.py` and `fuzz_bundles.py` first;
-each prints JSON. Then
+`measure_all.py` calls it with what `step_time.py`, `loop_timing.py`, `install_size.py`
+and `fuzz_bundles.py` print:
 
     python deploy/benchmarks/report.py --step S --loop L2=L … --size Z --fuzz F --out MD
 """
@@ -86,8 +86,8 @@ def page(step: list, loop: list, size: list, fuzz: dict) -> str:
         "# The robot's side, measured",
         f"Written by `python deploy/benchmarks/report.py` on {platform.machine()}, "
         f"{os.cpu_count()} cores, Python {platform.python_version()}, with the "
-        "committed crawl policy and while other work ran: `L1` should have been idle "
-        "and was not. Not on the robot's computer.",
+        "committed crawl policy; `busy cores` tells what else ran meanwhile (the loop "
+        "and its simulated hand take half of one). Not on the robot's computer.",
         "## A control step: observation, network, action, supervisor",
         "`step_time.py`. Wanted: median at most 0.5 ms, 99.9 % within 2 ms, memory "
         "flat within 1 MB, over 30 minutes' worth of steps.",

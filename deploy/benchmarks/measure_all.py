@@ -1,0 +1,155 @@
+"""Every measurement of the robot's side, one after the other, and both pages from them.
+
+    python deploy/benchmarks/measure_all.py --out OUT            # about 5 hours, idle
+    python deploy/benchmarks/measure_all.py --out OUT --small    # some minutes: a trial
+    python deploy/benchmarks/measure_all.py --out OUT --pages docs --only
+
+Results stay in OUT as JSON; what is there already is not measured again, so that a run
+may be cut off and gone on with (delete a file to measure it anew). `--pages` writes
+`safety-table.md`, `deploy-results.md` and the figure. The rows L1 to L5 mean something
+on an idle machine only.
+"""
+
+import argparse
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+HERE = Path(__file__).parent
+FAULTS, FIGURE = "faults", "disturbances"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One measurement.
+
+    Attributes:
+        name: of its file in the folder of results.
+        program: script and its options at full size.
+        small: options that replace those for a trial.
+        prints: the script prints its results; else it takes `--out`.
+    """
+
+    name: str
+    program: tuple[str, ...]
+    small: tuple[str, ...] = ()
+    prints: bool = True
+
+
+def _loop(name: str, minutes: int, *more: str) -> Part:
+    timing = ("loop_timing.py", *more, "--minutes")
+    return Part(f"loop {name}", (*timing, f"{minutes}"), (*timing, "0.3"))
+
+
+def _faults(part: str, full: tuple[str, ...], small: tuple[str, ...]) -> Part:
+    program = ("fault_matrix.py", "--parts", part)
+    return Part(f"{FAULTS} {part}", (*program, *full), (*program, *small), prints=False)
+
+
+PARTS = (
+    Part(
+        "step",
+        ("step_time.py", "--minutes", "30"),
+        ("step_time.py", "--minutes", "0.5"),
+    ),
+    Part("size", ("install_size.py",), ("install_size.py",)),
+    Part(
+        "fuzz",
+        ("fuzz_bundles.py", "--count", "10000"),
+        ("fuzz_bundles.py", "--count", "120"),
+    ),
+    _faults("matrix", ("--trials", "100"), ("--trials", "1")),
+    _faults("starts", ("--start-trials", "20"), ("--start-trials", "1")),
+    _faults("links", ("--loss-s", "600"), ("--loss-s", "2")),
+    _faults("fault_free", ("--hours", "1"), ("--hours", "0.003")),
+    Part(
+        FIGURE,
+        ("walking_quality.py",),
+        ("walking_quality.py", "--seconds", "1", "--trials", "1"),
+        prints=False,
+    ),
+    # In real time from here on.
+    _faults("processes", ("--process-trials", "20"), ("--process-trials", "1")),
+    _loop("L1", 10),
+    _loop("L1 plain", 10, "--no-realtime"),
+    _loop("L2", 10, "--load", "2"),
+    _loop("L3", 10, "--load", "2", "--no-realtime"),
+    _loop("L5", 120),
+)
+
+
+def measure(part: Part, out: Path, small: bool) -> bool:
+    """Runs one measurement, if it is not there yet; returns whether it went well."""
+    faults = part.name.startswith(FAULTS)
+    kept = out / f"{part.name}.{'done' if faults else 'json'}"
+    if kept.exists():
+        print(f"{part.name}: there already", flush=True)
+        return True
+    script, *options = part.small if small else part.program
+    if not part.prints:
+        options += ["--out", str(out / part.name.split()[0])]
+    begin = time.monotonic()
+    done = subprocess.run(
+        [sys.executable, str(HERE / script), *options],
+        stdout=subprocess.PIPE,
+        text=True,
+        check=False,
+    )
+    print(f"{part.name}: {time.monotonic() - begin:.0f} s", flush=True)
+    if done.returncode:
+        print(f"{part.name}: status {done.returncode}\n{done.stdout}", flush=True)
+        return False
+    if part.prints or faults:
+        kept.write_text(done.stdout, "utf-8")
+    return True
+
+
+def write_pages(out: Path, pages: Path) -> None:
+    """Writes both pages and the figure from the results."""
+    wanted = ["step.json", "size.json", "fuzz.json", f"{FAULTS}.md", f"{FIGURE}.png"]
+    missing = [name for name in wanted if not (out / name).exists()]
+    if missing:
+        raise SystemExit(f"no pages: {', '.join(missing)} not measured yet")
+    loops = sorted(out.glob("loop *.json"))
+    files = ("--step", "step.json", "--size", "size.json", "--fuzz", "fuzz.json")
+    report = [
+        word if word.startswith("--") else str(out / word)
+        for word in (*files, "--loop")
+    ]
+    report += [f"{file.stem.removeprefix('loop ')}={file}" for file in loops]
+    target = str(pages / "deploy-results.md")
+    program = [sys.executable, str(HERE / "report.py"), *report, "--out", target]
+    subprocess.run(program, check=True)
+    (pages / "safety-table.md").write_bytes((out / f"{FAULTS}.md").read_bytes())
+    images = pages / "images"
+    images.mkdir(exist_ok=True)
+    picture = (out / f"{FIGURE}.png").read_bytes()
+    (images / f"deploy-{FIGURE}.png").write_bytes(picture)
+
+
+def main() -> int:
+    """Measures; returns 0 if all of it went well."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True, help="folder of results")
+    parser.add_argument("--small", action="store_true", help="a trial of everything")
+    parser.add_argument("--parts", nargs="+", choices=[p.name for p in PARTS])
+    parser.add_argument("--pages", type=Path, metavar="DOCS", help="write the pages")
+    parser.add_argument("--only", action="store_true", help="the pages, nothing else")
+    options = parser.parse_args()
+    options.out.mkdir(parents=True, exist_ok=True)
+    busy = os.getloadavg()[0]
+    if busy > 0.5 and not options.only:
+        print(f"NOT IDLE: load {busy:.1f}; L1 to L5 will say little", flush=True)
+    chosen = [p for p in PARTS if not options.parts or p.name in options.parts]
+    parts = [] if options.only else chosen
+    well = [measure(part, options.out, options.small) for part in parts]
+    if options.pages:
+        write_pages(options.out, options.pages)
+    return 0 if all(well) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
