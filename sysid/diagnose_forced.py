@@ -29,6 +29,7 @@ from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.effects.chain import chain_step, init_states
 from envs.hand.effects.surroundings import Gravity, Surroundings
 from sysid import diagnose_command as command
+from sysid import diagnose_link as link
 from sysid.diagnose_records import SMOOTH_STEPS
 
 BAND_STEPS = 2.2
@@ -141,6 +142,8 @@ KINDS = {
 }
 """Effects that act behind the command path."""
 
+_RIGID = {n: kind for n, kind in KINDS.items() if n not in link.EFFECTS}
+
 
 @partial(jax.jit, static_argnames=("dt", "names"))
 def forced_residuals(
@@ -150,50 +153,50 @@ def forced_residuals(
     friction_speed: Float[Array, ""],
     dt: float,
     names: tuple[str, ...],
-) -> tuple[Float[Array, "2 m p c"], Float[Array, "2 m p c"]]:
-    """Returns the residuals (controller, mechanics) of candidates c and their noise.
+) -> Float[Array, "2 m p c"]:
+    """Returns the residuals (controller, mechanics) of candidates c [N·m].
 
     Where a joint may be at rest, its friction is whatever balances it: those samples
     of the mechanics must not count. Near them friction turns round within the band.
 
     Angles are noisy themselves, so both residuals are divided by the noise that a
     candidate would have, relative to the simulation as it stands: otherwise the fit
-    would lower gains to silence the noise that they amplify. The logarithm of that
-    noise comes along: it belongs to the density of the residual.
+    would lower gains to silence the noise that they amplify. (The density of readings
+    whose exact values are unknown, at the most likely ones, has no other term.)
 
     Args:
         track: the measured motion.
         params: values of the parameters of the effects by name.
         nuisance: `effort_gain`, `mass`, `push_gain` (factors), `skew_s` (age of the
-            angle against the effort).
+            angle against the effort), `rotor` (inertia on the motor's side of a play
+            [kg·m²]).
         friction_speed: speed below which a joint may be at rest.
         dt: step of the grid [s].
         names: effects in the order of the chain.
-
-    Returns:
-        Residuals [N·m], and log(noise / noise of the simulation as it stands).
     """
     path = command.command_path(track.held, track.share, params, dt)
     wide = {
-        n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in KINDS
+        n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in _RIGID
     }
-    figures = ("effort_gain", "mass", "skew_s", "push_gain")
-    gain, mass, skew, pushed = (nuisance[k][None, :] for k in figures)
+    figures = ("effort_gain", "mass", "skew_s", "push_gain", "rotor")
+    gain, mass, skew, pushed, rotor = (nuisance[k][None, :] for k in figures)
+    gap, soft, rotor = _between(params, rotor)
 
     def model(now):
         effort = gain * now["effort"]
         enter = {"effort": effort, "measured": track.measured[:, None]}
         slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
-        body = tuple((KINDS[n], p) for n, p in wide.items())
+        body = tuple((_RIGID[n], p) for n, p in wide.items())
         return ((_SLOW, slow), *body, (_ENTER, enter))
 
     def step(carry, row):
-        states, shift, shift_speed = carry
+        states, shift, shift_speed, behind = carry
         row, target = row
         now = {k: v[:, None] for k, v in row.items()}
         q = now["pos"] + skew * now["vel"] - shift
         qd = now["vel"] + skew * now["acc"] - shift_speed
-        moment = mass[..., None] * (now["moment"] - shift[..., None] * now["turned"])
+        turned = (shift - behind[0])[..., None] * now["turned"]
+        moment = mass[..., None] * (now["moment"] - turned)
         gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
         load = now["push"] + pushed * now["ext"] + jnp.sum(moment * gravity, -1)
         payload_kg = jnp.broadcast_to(track.payload_kg[:, None], q.shape)
@@ -216,7 +219,10 @@ def forced_residuals(
         )
         inertia = mass * now["inertia"] + x.inertia
         loud, usual = _loudness(track, now, x, gain, inertia)
-        needs = x.torque + x.passive + x.load - inertia * now["acc"]
+        own = jnp.minimum(rotor, 0.9 * inertia)
+        force = x.passive + x.load - (inertia - own) * now["acc"]
+        behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
+        needs = x.torque - own * now["acc"] + pull
         unit = gain * loud[1] / usual[1]
         quiet = loud[0] / usual[0]
         out = {
@@ -226,19 +232,30 @@ def forced_residuals(
             "enters": (1.0 - track.measured[:, None]) / unit * gain * quiet,
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
-            "quiet": jnp.log(quiet),
-            "unit": jnp.log(unit / gain),
         }
-        return (states, x.encoder - q, x.encoder_speed - qd), out
+        return (states, x.encoder - q, x.encoder_speed - qd, behind), out
 
     rows = {k: getattr(track, k) for k in _STEPWISE}
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
-    start = (init_states(model(first), path[0], q0, dt), 0.0 * q0, 0.0 * q0)
+    none = jnp.zeros_like(q0)
+    states = init_states(model(first), path[0], q0, dt)
+    start = (states, none, none, (none, none))
     out = jax.lax.scan(step, start, (rows, path))[1]
     return _filtered(
         out | {"command": path}, track.slow_vel[:, :, None], friction_speed
     )
+
+
+def _between(params, rotor):
+    """Returns play, compliance and the motor's inertia of the candidates."""
+    absent = {"gap_rad": jnp.zeros_like(rotor[0])}
+    gap = params.get("backlash", absent)["gap_rad"][None]
+    spring = params.get("compliance")
+    if spring is None:
+        return gap, jnp.zeros_like(gap), rotor
+    soft, own = spring["compliance_rad_nm"][None], spring["motor_inertia_kgm2"][None]
+    return gap, soft, jnp.where(soft > 0.0, own, rotor)
 
 
 def _loudness(track, now, x, gain, inertia):
@@ -263,9 +280,7 @@ def _filtered(out, vel, friction_speed):
     rounded = out["follow"] * (_smooth(out["command"]) - out["command"])
     needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
     mechanics = _band(needs + out["enters"] * rounded)
-    both = jnp.stack([_band(out["servo"] - rounded), mechanics])
-    last = _HALF + EVERY * mechanics.shape[0]
-    return both, jnp.stack([out["quiet"], out["unit"]])[:, _HALF:last:EVERY]
+    return jnp.stack([_band(out["servo"] - rounded), mechanics])
 
 
 def _smooth(x: Float[Array, "t p c"]) -> Float[Array, "t p c"]:

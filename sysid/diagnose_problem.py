@@ -9,7 +9,6 @@ beforehand: what a candidate leaves counts as noise, with its correlation in tim
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import jax
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
@@ -29,9 +28,6 @@ CHANNELS = ("controller", "mechanics")
 LONGEST = 20.0
 """Largest number of samples that may tell the same."""
 
-SURPLUS = 8.0
-"""Keeps the logarithm of the noise of a fold positive, per sample."""
-
 
 @dataclass(frozen=True, eq=False)
 class Noise:
@@ -39,13 +35,11 @@ class Noise:
 
     Attributes:
         a: a_k.
-        deviation: s, raised by √`alike`.
-        alike: number of samples that tell the same.
+        deviation: s.
     """
 
     a: Float[np.ndarray, " k"]
     deviation: float
-    alike: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +68,6 @@ class Problem:
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
     ) -> Float[np.ndarray, "c 2 m p"]:
         """Returns the residuals of candidates [N·m], zero where they do not count."""
-        weight = self.weight if weigh else 1.0
-        return np.where(self.valid, self._run(thetas)[0] * weight, 0.0)
-
-    def _run(self, thetas: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Returns residuals and the logarithms of their noise (c 2 m p)."""
         parts = []
         for first in range(0, len(thetas), LANES):
             some = thetas[first : first + LANES]
@@ -92,10 +81,9 @@ class Problem:
                 self.data.dt,
                 self.space.effects,
             )
-            both = np.stack([np.asarray(x, float) for x in jax.device_get(out)])
-            parts.append(np.moveaxis(both, -1, 1)[:, : len(some)])
-        residuals, loudness = np.concatenate(parts, 1)
-        return residuals, loudness
+            parts.append(np.moveaxis(np.asarray(out, float), -1, 0)[: len(some)])
+        weight = self.weight if weigh else 1.0
+        return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
 
     def whitened(self, raw: Float[np.ndarray, "c 2 m p"]) -> Float[np.ndarray, "c r"]:
         """Returns residuals in units of white noise, flat."""
@@ -106,43 +94,17 @@ class Problem:
         return np.concatenate(out, 1)
 
     def residual(self, thetas: Float[np.ndarray, "c n"]) -> Float[np.ndarray, "c r"]:
-        """Returns the weighted residuals of candidates.
+        """Returns the weighted residuals of candidates."""
+        return self.whitened(self.raw(thetas))
 
-        Minus twice the logarithm of their density is their sum of squares less
-        `surplus`: of every fold the last element is √(2 Σ log σ + a constant).
-        """
-        raw, loudness = self._run(thetas)
-        white = self.whitened(np.where(self.valid, raw * self.weight, 0.0))
-        alike = np.array([n.alike for n in self.noise])[:, None, None]
-        flat = (loudness / alike).reshape(len(thetas), -1)
-        flat = np.where(self.counts(False), flat, 0.0)
-        sums = [flat[:, self.folds(False) == g].sum(1) for g in self.groups()]
-        least = [SURPLUS * np.sum(self._within(g)) for g in self.groups()]
-        total = 2.0 * np.stack(sums, 1) + np.array(least)
-        return np.concatenate([white, np.sqrt(np.maximum(total, 1e-6))], 1)
+    def folds(self) -> Int[np.ndarray, " r"]:
+        """Returns the fold of every weighted residual."""
+        return np.concatenate([self.fold.ravel()] * 2)
 
-    def groups(self) -> range:
-        """Numbers of the folds."""
-        return range(int(self.fold.max()) + 1)
-
-    def _within(self, g: int) -> Bool[np.ndarray, " r"]:
-        return self.counts(False) & (self.folds(False) == g)
-
-    @property
-    def surplus(self) -> float:
-        """What the sum of squares of a residual is too large."""
-        return SURPLUS * float(self.counts().sum())
-
-    def folds(self, whole: bool = True) -> Int[np.ndarray, " r"]:
-        """Returns the fold of every weighted residual, at will without the last."""
-        ends = [np.array(self.groups())] if whole else []
-        return np.concatenate([self.fold.ravel()] * 2 + ends)
-
-    def counts(self, whole: bool = True) -> Bool[np.ndarray, " r"]:
-        """Tells which weighted residuals count as samples."""
+    def counts(self) -> Bool[np.ndarray, " r"]:
+        """Tells which weighted residuals count."""
         kept = [_whole(self.valid[k], len(self.noise[k].a)).ravel() for k in range(2)]
-        ends = [np.zeros(len(self.groups()), bool)] if whole else []
-        return np.concatenate(kept + ends)
+        return np.concatenate(kept)
 
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "Problem":
         """Takes the noise from the repeats of a residual, else from the residual."""
@@ -252,8 +214,7 @@ def _correlated(series: np.ndarray, valid: np.ndarray) -> Noise:
         if rho < 0.1:
             break
         total += 2.0 * rho
-    alike = min(total, LONGEST)
-    return Noise(np.zeros(0), max(np.sqrt(power * alike), 1e-12), alike)
+    return Noise(np.zeros(0), max(np.sqrt(power * min(total, LONGEST)), 1e-12))
 
 
 def _repeat(data: JointTrack) -> int:

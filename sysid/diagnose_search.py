@@ -24,6 +24,9 @@ from sysid.fit import Fit, Task, fit_all
 MOST = 3
 """Largest number of causes."""
 
+REFINED = 4
+"""Number of candidates whose fits are continued."""
+
 LEAST_SHARE = 0.03
 """Least share of the held-out error that a cause must remove."""
 
@@ -35,6 +38,9 @@ ALIKE = 0.015
 
 THRESHOLD = 12.0
 """Least gain of a cause in the logarithm of the predictive density [nat]."""
+
+FIGURE_THRESHOLD = 6.0
+"""The same of a figure that the simulation has and that leaves its tolerance [nat]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,12 +85,17 @@ class Search:
 
     def gain(self, worse: Model, better: Model) -> float:
         """Gain in log predictive density [nat], at the error that remains."""
-        return gain_nat(worse.score, better.score, self.samples)
+        return gain_nat(worse, better, self.samples)
 
 
-def gain_nat(worse: float, better: float, samples: int) -> float:
-    """Returns ½ (S_worse − S_better) / max(1, s²), s² the error per sample left."""
-    return 0.5 * (worse - better) / max(1.0, better / max(samples, 1))
+def gain_nat(worse: Model, better: Model, samples: int) -> float:
+    """Returns ½ (S_worse − S_better) / max(1, s²), s² the error per sample left.
+
+    The errors on all data must fall as much: a fold that alone tells a figure is badly
+    predicted from its tolerance, and that is not the simulation's fault.
+    """
+    held, fitted = worse.score - better.score, worse.fit.cost - better.fit.cost
+    return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
 
 
 def search(problem: Problem) -> Search:
@@ -112,12 +123,12 @@ def _searched(problem: Problem, base: Model) -> Search:
         if not stage:
             break
         winner = stage[0]
-        if not _worth(best, winner, samples):
+        if not _worth(problem, best, winner, samples):
             break
         again = fit_models(problem, [best.effects], [winner.fit.theta])[0]
-        if again.score < best.score:
+        if again.fit.cost < best.fit.cost:
             base = again if not best.effects else base
-            if not _worth(again, winner, samples):
+            if not _worth(problem, again, winner, samples):
                 best = again
                 break
         best = _pruned(problem, winner, samples)
@@ -131,10 +142,13 @@ def _searched(problem: Problem, base: Model) -> Search:
     return Search(problem, base, best, rivals, without, samples)
 
 
-def _worth(smaller: Model, larger: Model, samples: int) -> bool:
+def _worth(problem: Problem, smaller: Model, larger: Model, samples: int) -> bool:
     """Tells whether a larger model is worth its effect."""
+    gain = gain_nat(smaller, larger, samples)
+    added = [e for e in larger.effects if e not in smaller.effects]
+    if all(problem.space.figured(e) for e in added):
+        return gain > FIGURE_THRESHOLD
     share = 1.0 - larger.score / smaller.score
-    gain = gain_nat(smaller.score, larger.score, samples)
     told = smaller.penalty - larger.penalty > OUT_OF_TOLERANCE
     return gain > THRESHOLD and (share > LEAST_SHARE or told)
 
@@ -161,7 +175,22 @@ def _extended(problem: Problem, model: Model) -> list[Model]:
     for m in models:
         if m.effects not in best or m.fit.cost < best[m.effects].fit.cost:
             best[m.effects] = m
-    return _simplest_first(problem, model, sorted(best.values(), key=lambda m: m.score))
+    stage = _refined(problem, model, list(best.values()))
+    return _simplest_first(problem, model, stage)
+
+
+def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
+    """Goes on with the fits that are nearest to the records; best first."""
+    samples = int(problem.counts().sum())
+
+    def order(m: Model) -> float:
+        return -gain_nat(smaller, m, samples)
+
+    near = sorted(stage, key=lambda m: m.fit.cost)[:REFINED]
+    near += [m for m in sorted(stage, key=order)[:REFINED] if m not in near]
+    sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
+    again = {m.effects: m for m in fit_models(problem, sets, starts, rounds=14)}
+    return sorted((again.get(m.effects, m) for m in stage), key=order)
 
 
 def _simplest_first(
@@ -171,10 +200,12 @@ def _simplest_first(
     if not stage:
         return stage
     samples = int(problem.counts().sum())
-    gain = gain_nat(smaller.score, stage[0].score, samples)
-    slack = max(3.0, ALIKE * gain)
-    tied = [m for m in stage if gain_nat(m.score, stage[0].score, samples) < slack]
-    first = min(tied, key=lambda m: (len(problem.space.of(m.effects[-1])), m.score))
+    gains = {m.effects: gain_nat(smaller, m, samples) for m in stage}
+    most = gains[stage[0].effects]
+    tied = [m for m in stage if most - gains[m.effects] < max(3.0, ALIKE * most)]
+    first = min(
+        tied, key=lambda m: (len(problem.space.of(m.effects[-1])), -gains[m.effects])
+    )
     return [first, *(m for m in stage if m is not first)]
 
 
@@ -211,10 +242,11 @@ def fit_models(
     sets: Sequence[tuple[str, ...]],
     starts: Sequence[Float[np.ndarray, " n"]],
     shared: dict | None = None,
+    rounds: int = 5,
 ) -> list[Model]:
     """Fits models from given starts and scores them on held-out folds."""
     tasks = [_task(problem, s, t) for s, t in zip(sets, starts, strict=True)]
-    fits = fit_all(problem.residual, tasks, shared=shared)
+    fits = fit_all(problem.residual, tasks, rounds, shared=shared)
     return _scored(problem, sets, tasks, fits)
 
 
@@ -246,7 +278,7 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         mine = squares[k * count : (k + 1) * count]
         score = sum(float(mine[g][folds == g].sum()) for g in range(count))
         penalty = _penalty(problem, tasks[k], effects, fit.theta)
-        score = score - problem.surplus + penalty if np.isfinite(score) else np.inf
+        score = score + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
         models.append(Model(tuple(effects), fit, score, penalty, kept))
     return models
@@ -264,15 +296,18 @@ def _without(
 ) -> np.ndarray:
     """Returns the coordinates that the data without one fold ask for.
 
-    What belongs to a record and not to the mechanism stays.
+    What belongs to a record and not to the mechanism stays. What the fit has not
+    reached yet on all data is not the fold's.
     """
-    kept = folds != g
-    j, r, k = fit.jacobian[kept], fit.residual[kept], fit.free
+    k = fit.free
     weight = 1.0 / task.deviation[k] ** 2
-    h = j.T @ j + np.diag(weight)
-    step = np.linalg.solve(h, j.T @ r + weight * (fit.theta - task.center)[k])
+    steps = []
+    for kept in (folds != g, np.ones(len(folds), bool)):
+        j, r = fit.jacobian[kept], fit.residual[kept]
+        slope = j.T @ r + weight * (fit.theta - task.center)[k]
+        steps.append(np.linalg.solve(j.T @ j + np.diag(weight), slope))
     theta = fit.theta.copy()
-    theta[k] = np.clip(theta[k] - step, task.low[k], task.high[k])
+    theta[k] = np.clip(theta[k] - steps[0] + steps[1], task.low[k], task.high[k])
     theta[local] = fit.theta[local]
     return theta
 
@@ -283,7 +318,7 @@ def _pruned(problem: Problem, model: Model, samples: int) -> Model:
         sets = [tuple(e for e in model.effects if e != out) for out in model.effects]
         smaller = fit_models(problem, sets, [model.fit.theta] * len(sets))
         best = min(smaller, key=lambda m: m.score)
-        if _worth(best, model, samples):
+        if _worth(problem, best, model, samples):
             return model
         model = best
     return model

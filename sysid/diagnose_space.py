@@ -23,14 +23,20 @@ from sysid.diagnose_forced import joint_effects
 from sysid.diagnose_tracks import JointTrack
 from sysid.mechanism import Figure, JointDrive
 
+SIGMA = 3.0**-0.5
+"""Deviation of a figure that may be anywhere within its tolerance, in tolerances."""
+
 SKEW_S = 5e-4
-"""Age of the angle against the effort that is no news [s]."""
+"""Largest age of the angle against the effort that is no news [s]."""
 
 DELAY_S = 1e-3
-"""Least deviation of a known delay that is news [s]."""
+"""Largest deviation of a known delay that is no news, whatever its tolerance [s]."""
 
 MASS = 0.05
-"""Relative deviation of the modelled masses and inertias that is no news."""
+"""Largest relative deviation of masses and inertias that is no news."""
+
+ROTOR = 1.0
+"""Largest logarithm by which the motor's share of a joint's inertia may be wrong."""
 
 NUISANCE = ""
 Kind = Literal["linear", "log", "reciprocal"]
@@ -46,7 +52,7 @@ class Slot:
         kind, scale: how coordinate and parameter go together; see the module.
         base: coordinate in the simulation as it stands.
         low, high: range of the search.
-        tight: deviation that is no news; 0: fixed unless released; inf: free.
+        tight: prior deviation; 0: fixed unless released; inf: free.
         starts: coordinates from which a search begins.
         vanishes: whether the effect is absent at `base`.
     """
@@ -100,6 +106,10 @@ class Space:
     def of(self, effect: str) -> list[int]:
         """Indices of the coordinates of an effect."""
         return [i for i, s in enumerate(self.slots) if s.effect == effect]
+
+    def figured(self, effect: str) -> bool:
+        """Tells whether the simulation has all figures of an effect."""
+        return all(self.slots[i].tight > 0.0 for i in self.of(effect))
 
     def nuisances(self) -> list[int]:
         """Indices of the coordinates that every candidate may adjust."""
@@ -162,6 +172,9 @@ def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> 
         _pseudo("mass", "1", "log", 1.0, MASS),
         _pseudo("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
     ]
+    inertia = float(np.mean(np.asarray(track.track.inertia)))
+    rotor = 0.5 * track.armature if track.armature > 0.0 else 0.1 * inertia
+    slots.append(_pseudo("rotor", "kg·m²", "log", rotor, ROTOR))
     if np.any(np.asarray(track.track.ext)):
         free = _pseudo("push_gain", "1", "linear", 1.0, math.inf)
         slots.append(replace(free, base=1.0))
@@ -178,7 +191,8 @@ def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> 
 
 
 def _pseudo(name: str, unit: str, kind: Kind, scale: float, tight: float) -> Slot:
-    return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, tight, (), False)
+    sigma = SIGMA * tight
+    return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, sigma, (), False)
 
 
 def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Figure]:
@@ -213,8 +227,10 @@ def _sizes(track: JointTrack) -> dict[str, float]:
     }
 
 
-_LINEAR = (0.1,)
-_STEPS = (0.004, 0.01, 0.025, 0.06, 0.15, 0.4)
+_GRIDS = {
+    "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
+    "rad/(N·m)": (0.01, 0.03, 0.1, 0.3, 1.0),
+}
 _RECIPROCAL = {"N·m": (1.0, 1.2, 1.6), "rad/s": (0.6, 0.9, 1.2, 1.8)}
 
 
@@ -249,7 +265,7 @@ def _slot(
         if scale is None:
             scale = prior.spread if prior.kind == "normal" else prior.center
         signed = parameter.low < 0.0
-        grid = _STEPS if parameter.unit == "rad" else _LINEAR
+        grid = _GRIDS.get(parameter.unit, (0.1,))
         if size is None:
             grid = (0.5,)
         starts = (0.1, -0.1) if signed else grid
@@ -279,7 +295,7 @@ def _known(slot: Slot, figure: Figure) -> Slot:
         slot,
         base=base,
         low=low,
-        tight=math.inf if figure.free else tight,
+        tight=math.inf if figure.free else SIGMA * tight,
         starts=starts,
         vanishes=absent or slot.effect in ("stiffness", "damping"),
     )

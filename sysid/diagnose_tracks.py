@@ -28,6 +28,7 @@ class JointTrack:
         moving: where the joint is certainly not at rest (m, p).
         doubt: about both residuals, beyond their usual noise; see `diagnose_doubt`
             [N·m] (2, m, p).
+        armature: part of the inertia that the model gives to the drive [kg·m²].
         log: record that a piece is from.
         start_s: time at which a piece starts [s].
         effort: whether the effort was logged, for every piece.
@@ -42,6 +43,7 @@ class JointTrack:
     valid: Bool[np.ndarray, "m p"]
     moving: Bool[np.ndarray, "m p"]
     doubt: Float[np.ndarray, "2 m p"]
+    armature: float
     log: Int[np.ndarray, " p"]
     start_s: Float[np.ndarray, " p"]
     effort: Bool[np.ndarray, " p"]
@@ -155,6 +157,9 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         valid=valid,
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,
         doubt=_doubt(fields, drive, step_s, rows),
+        armature=float(
+            mechanism.model.dof_armature[mechanism.model.joint(joint).dofadr[0]]
+        ),
         log=np.array([p.log for p in pieces]),
         start_s=np.array([p.t_s[0] for p in pieces]),
         effort=logged,

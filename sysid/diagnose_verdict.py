@@ -127,7 +127,7 @@ def _evidence(found: Search, effect: str) -> float:
     """Gain of the best model over the one without the effect."""
     best = found.best
     without = found.without.get(effect, found.base)
-    return round(gain_nat(without.score, best.score, found.samples), 3)
+    return round(gain_nat(without, best, found.samples), 3)
 
 
 def _places(joints, mechanism: Mechanism, searched):
@@ -211,10 +211,11 @@ def _alternatives(found: Search) -> tuple[Alternative, ...]:
     """
     cause = max(found.best.effects, key=lambda e: _evidence(found, e))
     gain = _evidence(found, cause)
+    without = found.without.get(cause, found.base)
     space, result = found.problem.space, []
     for model in found.rivals.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
-        gap = gain_nat(model.score, found.best.score, found.samples)
+        gap = gain - gain_nat(without, model, found.samples)
         larger = len(space.of(effect)) > len(space.of(cause))
         told = gap > max(SURE, NEARLY * gain) or (larger and gap > -SURE)
         if np.isfinite(gap) and gap < 0.9 * gain:

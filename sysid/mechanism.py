@@ -28,8 +28,8 @@ class Figure:
 
     Attributes:
         value: the figure.
-        tolerance: relative deviation (one sigma) that is no news; for a figure of zero
-            in its own unit.
+        tolerance: largest relative deviation that is no news; for a figure of zero in
+            its own unit.
         free: whether nothing is known of it: a fit may choose it, and that is no news.
     """
 

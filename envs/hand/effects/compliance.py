@@ -13,10 +13,12 @@ class Spring:
 
     Attributes:
         torque: torque of the spring before the substep [N·m].
+        ahead: speed of the motor less that of the joint.
         base, slope: its torque after the substep is base − slope · joint speed.
     """
 
     torque: Float[Array, "*j"]
+    ahead: Float[Array, "*j"]
     base: Float[Array, "*j"]
     slope: Float[Array, "*j"]
 
@@ -27,9 +29,8 @@ def _encoder(params: Params, spring: Spring, x, dt):
     lag = params["compliance_rad_nm"]
     ahead = lag * (torque - spring.torque) / dt
     encoder, speed = x.encoder + lag * torque, x.encoder_speed + ahead
-    return spring.replace(torque=torque), x.replace(
-        encoder=encoder, encoder_speed=speed
-    )
+    spring = spring.replace(torque=torque, ahead=ahead)
+    return spring, x.replace(encoder=encoder, encoder_speed=speed)
 
 
 def _transmission(params: Params, spring: Spring, x, dt):
@@ -46,8 +47,9 @@ def _transmission(params: Params, spring: Spring, x, dt):
         inertia = jnp.minimum(inertia, x.around.inertia)
     heavy = inertia / dt + x.damping
     soft = lag * (heavy / dt + x.follows * x.kp)
-    motor_speed = x.encoder_speed
-    base = (x.torque + heavy * motor_speed + soft * spring.torque) / (1.0 + soft)
+    base = (x.torque + heavy * (x.qd + spring.ahead) + soft * spring.torque) / (
+        1.0 + soft
+    )
     slope = heavy / (1.0 + soft)
     return spring.replace(base=base, slope=slope), x.replace(
         torque=base - slope * x.qd,
@@ -58,7 +60,7 @@ def _transmission(params: Params, spring: Spring, x, dt):
 
 def _rest(params: Params, target, q, dt) -> Spring:
     none = jnp.zeros_like(q)
-    return Spring(torque=none, base=none, slope=none)
+    return Spring(torque=none, ahead=none, base=none, slope=none)
 
 
 EFFECT = EffectKind(

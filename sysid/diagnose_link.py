@@ -1,0 +1,78 @@
+"""A link behind play or a spring, led by the measured motion of its motor.
+
+The encoder sits on the motor, so the link's angle is not measured. With x, the link's
+angle less the motor's, and all that acts on the link in the motor's frame,
+F = load − J q̈_m,
+
+    rigid       x = 0
+    spring      J ẍ = F − D ẋ − x / C
+    play        J ẍ = F between the walls, |x| ≤ b / 2; a wall takes all speed
+
+the motor feels the pull F − J ẍ.
+"""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+DAMPING = 0.1
+"""Damping ratio of a spring: what metal and gears have."""
+
+EFFECTS = ("backlash", "compliance")
+"""Effects that act here."""
+
+State = tuple[Float[Array, "p c"], Float[Array, "p c"]]
+"""Angle [rad] and speed [rad/s] of the link less the motor's."""
+
+
+def link_step(
+    state: State,
+    force: Float[Array, "p c"],
+    inertia: Float[Array, "p c"],
+    gap_rad: Float[Array, "p c"],
+    compliance: Float[Array, "p c"],
+    dt: float,
+) -> tuple[State, Float[Array, "p c"]]:
+    """Advances the link by a step.
+
+    Args:
+        state: at the beginning of the step.
+        force: F [N·m].
+        inertia: of the link, J [kg·m²].
+        gap_rad: play b; 0 for none.
+        compliance: C of the spring [rad/(N·m)]; 0 for none. Play goes before it.
+        dt: step [s].
+
+    Returns:
+        The state at its end, and the mean pull on the motor during it [N·m].
+    """
+    x, speed = state
+    soft = _spring(x, speed, force, inertia, compliance, dt)
+    loose = _play(x, speed, force, inertia, 0.5 * gap_rad, dt)
+    angle, rate = (
+        jnp.where(gap_rad > 0.0, a, jnp.where(compliance > 0.0, b, 0.0))
+        for a, b in zip(loose, soft, strict=True)
+    )
+    return (angle, rate), force - inertia * (rate - speed) / dt
+
+
+def _play(x, speed, force, inertia, half, dt) -> State:
+    """Flies freely, and stops at a wall."""
+    ahead = speed + force / inertia * dt
+    free = x + ahead * dt
+    return jnp.clip(free, -half, half), ahead * (jnp.abs(free) < half)
+
+
+def _spring(x, speed, force, inertia, compliance, dt) -> State:
+    """Swings about where the force holds it: exact for an even force."""
+    lag = jnp.maximum(compliance, 1e-9)
+    omega = jnp.sqrt(1.0 / (lag * inertia))
+    away = x - force * lag
+    turn = jnp.sqrt(1.0 - DAMPING**2) * omega
+    fade = jnp.exp(-DAMPING * omega * dt)
+    cosine, sine = jnp.cos(turn * dt), jnp.sin(turn * dt) / turn
+    lead = speed + DAMPING * omega * away
+    pull = omega**2 * away + DAMPING * omega * speed
+    return (
+        force * lag + fade * (away * cosine + lead * sine),
+        fade * (speed * cosine - pull * sine),
+    )
