@@ -9,7 +9,7 @@ from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.cli.console import REFUSED, drive
 from fingers_deploy.cli.options import check_library, check_options, check_sources
-from fingers_deploy.drivers.open import KINDS, open_driver
+from fingers_deploy.drivers.open import KINDS
 from fingers_deploy.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
@@ -134,7 +134,7 @@ def guard(options: argparse.Namespace) -> int:
     check_library(options.driver)
     if options.driver == "sim" and not options.socket:
         raise InputError("--driver sim", "", "no hand", "--socket PATH of a simulator")
-    safe, words = guard_hand(lambda: open_driver(_driver(options), interface))
+    safe, words = guard_hand(_driver(options), interface)
     print(words)
     return 0 if safe else 5
 

@@ -37,6 +37,16 @@ class RawImu(Protocol):
         ...
 
 
+class NoImu:
+    """In the place of an IMU where nobody looks at one."""
+
+    def read(self) -> None:
+        """Has no sample."""
+
+    def close(self) -> None:
+        """Has nothing to let go of."""
+
+
 class ImuPort:
     """Reads a sensor in a thread of its own and keeps the newest sample.
 

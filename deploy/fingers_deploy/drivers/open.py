@@ -6,8 +6,8 @@ from typing import Any
 
 from fingers_deploy.drivers.bno085 import Bno085, I2cBus
 from fingers_deploy.drivers.dry import DryRun
-from fingers_deploy.drivers.imu_port import ImuPort
-from fingers_deploy.drivers.protocol import Driver
+from fingers_deploy.drivers.imu_port import ImuPort, NoImu
+from fingers_deploy.drivers.protocol import Driver, Imu
 from fingers_deploy.drivers.replay import ReplayDriver
 from fingers_deploy.drivers.sim import SimDriver
 from fingers_deploy.drivers.wuji import WujiDriver
@@ -23,7 +23,8 @@ def open_driver(options: Mapping[str, Any], interface: Interface) -> Driver:
 
     Args:
         options: of `sim`: `socket`; of `replay`: `log`; of `wuji`: `side`, `serial`,
-            `imu_bus`, `imu_address`, `imu_mount`. Of all: `dry_run`.
+            `imu_bus`, `imu_address`, `imu_mount`, `without_imu` (the guard may not need
+            what has perhaps failed). Of all: `dry_run`.
         interface: of the policy.
 
     Raises:
@@ -48,8 +49,10 @@ def _wuji(options: Mapping[str, Any], interface: Interface) -> Driver:
     except ImportError as error:
         valid = "pip install fingers-deploy[hand]"
         raise InputError("driver", "wuji", "no wujihandpy", valid) from error
-    bus = I2cBus(options["imu_bus"], options["imu_address"])
-    imu = ImuPort(Bno085(bus), tuple(options["imu_mount"]))
+    imu: Imu = NoImu()
+    if not options.get("without_imu"):
+        bus = I2cBus(options["imu_bus"], options["imu_address"])
+        imu = ImuPort(Bno085(bus), tuple(options["imu_mount"]))
     try:
         return WujiDriver(
             wujihandpy, interface, imu, options["side"], options.get("serial")

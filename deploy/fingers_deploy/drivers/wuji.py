@@ -8,7 +8,10 @@ What this driver must know about that library:
   runs in the loop, but in a thread (`slow_path`), under one lock.
 - Arrays are [5, 4], finger by finger, J1 to J4, the order of our joint vector.
 - The cached angles are zeros before the first frame.
-- `Hand()` starts a check for upgrades in the background; it needs no network to work.
+- `Hand()` starts a check for upgrades in the background where standard error is a
+  terminal; it needs no network to work.
+- Firmware before 1.1 lets a question for its serial number run out after 3 s; before
+  1.2 it tells no efforts, and reading them raises.
 """
 
 import time
@@ -28,6 +31,7 @@ EFFORT_LIMIT_A = 1.0
 LOWPASS_HZ = 3.0
 _SHAPE = (5, 4)
 _SIDES = {0: "right", 1: "left"}
+_TELLS_SERIAL = (1, 1)
 
 
 class WujiDriver:
@@ -69,7 +73,7 @@ class WujiDriver:
             )
         )
         self.info = DriverInfo(
-            name=f"WUJI {side} hand {self._hand.get_product_sn()}",
+            name=f"WUJI {side} hand {self._serial()}",
             joint_names=interface.joint_names,
             joint_limits_rad=np.stack([low, high], axis=1),
             lowpass_hz=LOWPASS_HZ,
@@ -124,6 +128,13 @@ class WujiDriver:
         found = _SIDES.get(code, f"handedness {code}")
         if found != side:
             raise InputError("hand", "handedness", found, side)
+
+    def _serial(self) -> str:
+        """Serial number; firmware before 1.1 does not tell it, after long asking."""
+        version = int(self._hand.get_full_system_firmware_version())
+        if (version & 0xFF, version >> 8 & 0xFF) < _TELLS_SERIAL:
+            return "of unknown serial number"
+        return str(self._hand.get_product_sn())
 
 
 def _check_names(interface: Interface) -> None:

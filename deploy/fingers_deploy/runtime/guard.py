@@ -1,22 +1,30 @@
 """The guard: opens a hand for one purpose, to de-energize it."""
 
+import contextlib
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
+from fingers_deploy.drivers.open import open_driver
 from fingers_deploy.drivers.protocol import Driver
+from fingers_deploy.manifest import Interface
 
 TRIES = 4
 CONFIRM_S = 0.5
 
 
-def guard_hand(open_hand: Callable[[], Driver]) -> tuple[bool, str]:
+def guard_hand(options: Mapping[str, Any], interface: Interface) -> tuple[bool, str]:
     """Opens a hand, de-energizes it, lets go of it.
+
+    Args:
+        options: of the driver, as `drivers.open_driver` takes them.
+        interface: of the policy.
 
     Returns:
         Whether the hand confirmed that it is de-energized, and that in words.
     """
     try:
-        driver = open_hand()
+        driver = open_driver({**options, "without_imu": True}, interface)
         safe = make_safe(driver)
         driver.close()
     except Exception as error:
@@ -42,7 +50,8 @@ def make_safe(
         try:
             driver.disable()
             while now() - asked < CONFIRM_S:
-                driver.read()
+                with contextlib.suppress(Exception):
+                    driver.read()  # takes what has come; only health counts here
                 health = driver.health()
                 if health is not None and health.disabled and health.t_s > asked:
                     return True

@@ -16,7 +16,6 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.drivers.open import open_driver
 from fingers_deploy.runtime.guard import guard_hand
 from fingers_deploy.runtime.link import make_link
 
@@ -122,9 +121,7 @@ class Launcher:
             notify(self._notify, "READY=1\nWATCHDOG=1")
 
     def _guard(self) -> None:
-        _, words = guard_hand(
-            lambda: open_driver(self._options["driver"], self._interface)
-        )
+        _, words = guard_hand(self._options["driver"], self._interface)
         self._say(f"guard: {words}")
 
 

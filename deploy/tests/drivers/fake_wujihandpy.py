@@ -33,6 +33,7 @@ class Device:
         self.error = np.zeros((5, 4), np.uint32)
         self.volts = 14.8
         self.handedness = 0
+        self.firmware = (1, 2)
         self.connected = True
         self.frames = True
         self.enabled = np.zeros((5, 4), bool)
@@ -83,7 +84,13 @@ class Hand:
         self._slow("read_handedness")
         return self._device.handedness
 
+    def get_full_system_firmware_version(self):
+        major, minor = self._device.firmware
+        return np.uint32(major | minor << 8 | 0x7E << 24)
+
     def get_product_sn(self):
+        if self._device.firmware < (1, 1):
+            raise TimeoutError("no answer for 3 s")
         return "FAKE-1"
 
     def read_joint_lower_limit(self, timeout=0.5):
@@ -143,6 +150,8 @@ class _Controller:
         return self._refresh()[0]
 
     def get_joint_actual_effort(self):
+        if self._device.firmware < (1, 2):
+            raise RuntimeError("Effort feedback requires firmware version >= 1.2.0")
         return self._refresh()[1]
 
     def set_joint_target_position(self, value_array):

@@ -1,17 +1,19 @@
 import dataclasses
 import importlib.util
+import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fingers_deploy.drivers.open import open_driver
 from fingers_deploy.drivers.wuji import WujiDriver
 from fingers_deploy.errors import InputError
 from fingers_deploy.reading import ImuReading
 from fingers_deploy.rotations import conjugate
 from fingers_deploy.runtime.core import Core
-from fingers_deploy.runtime.guard import make_safe
+from fingers_deploy.runtime.guard import guard_hand, make_safe
 from fingers_deploy.runtime.ticker import Ticker
 from fingers_deploy.safety import Mode, Operator, Proposal, make_limits
 from fingers_deploy.safety.detect_health import unhealthy
@@ -66,6 +68,28 @@ def test_opens_de_energized_with_its_limits_and_filter(library, driver):
     assert (device.effort_limit == 1.0).all() and device.cutoff == 3.0
     assert driver.info.lowpass_hz == 3.0
     np.testing.assert_array_equal(driver.info.joint_limits_rad[3], [-0.6, 1.7])
+
+
+def test_old_firmware_is_opened_to_be_de_energized_but_not_read(library, interface):
+    """The guard must get in; a run without efforts must not."""
+    library.DEVICE.firmware = (1, 0)
+    old = WujiDriver(library, interface, StillImu())
+    assert "unknown serial" in old.info.name
+    with pytest.raises(RuntimeError, match="firmware version"):
+        old.read()
+    assert make_safe(old)
+    old.close()
+
+
+def test_the_guard_needs_no_imu(library, interface, monkeypatch):
+    monkeypatch.setitem(sys.modules, "wujihandpy", library)
+    options = {"kind": "wuji", "side": "right", "imu_bus": 99, "imu_address": 0x4A,
+               "imu_mount": (1.0, 0.0, 0.0, 0.0)}  # fmt: skip
+    with pytest.raises(OSError, match="i2c-99"):
+        open_driver(options, interface)
+    library.DEVICE.enabled[:] = True
+    assert guard_hand(options, interface) == (True, "de-energized, confirmed")
+    assert not library.DEVICE.enabled.any()
 
 
 def test_joints_keep_their_order(library, driver):

@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from fingers_deploy.drivers.open import _OPENERS
 from fingers_deploy.runtime.console import ConsoleLink
 from fingers_deploy.runtime.guard import guard_hand
 from fingers_deploy.runtime.launcher import notify
@@ -174,11 +175,14 @@ def test_an_impossible_number_of_joints_is_none():
         assert decode_answer(bytes(data)).proposal.target_rad.size == 0
 
 
-def test_a_hand_that_cannot_be_opened_is_said_to_need_its_battery_cut():
-    def gone():
+def test_a_hand_that_cannot_be_opened_is_said_to_need_its_battery_cut(
+    interface, monkeypatch
+):
+    def gone(options, interface):
         raise RuntimeError("the library gave up")
 
-    safe, words = guard_hand(gone)
+    monkeypatch.setitem(_OPENERS, "sim", gone)
+    safe, words = guard_hand({"kind": "sim"}, interface)
     assert not safe and "gave up" in words and "CUT THE BATTERY" in words
 
 
