@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 SCRIPT = Path(__file__).parents[1] / "benchmarks" / "throughput.py"
+IDENTIFY = SCRIPT.with_name("identify.py")
 
 
 @pytest.mark.slow
@@ -38,3 +39,14 @@ def test_throughput_is_measured_and_compared(tmp_path):
     factor = found["ratios"]["environment: cpu / jax"]
     assert factor == rates["cpu", "environment"] / rates["jax", "environment"]
     assert f"environment: cpu / jax: {factor:.3g}" in done.stdout
+
+
+@pytest.mark.slow
+def test_three_parameters_are_found_within_two_percent(tmp_path):
+    out = tmp_path / "out.json"
+    words = ["--only", "ours", "--seeds", "3", "--json", str(out)]
+    subprocess.run([sys.executable, str(IDENTIFY), *words], check=True)
+    rows = json.loads(out.read_text(encoding="utf-8"))["rows"]
+    assert len(rows) == 3
+    names = ("stiffness", "damping", "armature")
+    assert max(row[name] for row in rows for name in names) < 0.02
