@@ -5,8 +5,9 @@ from jaxtyping import Float
 
 from sysid.diagnose_forced import sample_rows
 from sysid.diagnose_loop import simulated
+from sysid.diagnose_model import Model
 from sysid.diagnose_problem import Problem
-from sysid.diagnose_search import Model, Search
+from sysid.diagnose_search import Search
 from sysid.diagnosis import Gain
 
 BLOCKS = 24
@@ -40,7 +41,7 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
 
 def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, "m p"]:
     """Residual of every sample with the parameters that were found without its fold."""
-    raw = problem.raw(model.fold_theta, weigh=False)[:, channel]
+    raw = problem.raw(model.fold_theta)[:, channel]
     return np.take_along_axis(raw, problem.fold[None], 0)[0]
 
 
@@ -55,7 +56,8 @@ def _angle_errors(problem: Problem, model: Model) -> Float[np.ndarray, "m p"]:
 def _gain(problem, before, after, k, unit, seed) -> Gain:
     """Compares two held-out errors."""
     valid = problem.valid[k]
-    floor = _floor(problem, after, valid)
+    floors = [_floor(problem, errors, valid) for errors in (before, after)]
+    floor = min((f for f in floors if f is not None), default=None)
     old, new = before[valid] ** 2, after[valid] ** 2
     part = np.array_split(np.arange(old.size), min(BLOCKS, max(1, old.size // 4)))
     sums = np.array([(old[i].sum(), new[i].sum(), len(i)) for i in part])

@@ -55,6 +55,7 @@ class Slot:
         tight: prior deviation; 0: fixed unless released; inf: free.
         starts: coordinates from which a search begins.
         vanishes: whether the effect is absent at `base`.
+        comb: whether it has many optima beside each other, as the step of a grid has.
     """
 
     effect: str
@@ -68,6 +69,7 @@ class Slot:
     tight: float
     starts: tuple[float, ...]
     vanishes: bool
+    comb: bool = False
 
     def value(self, u: Float[np.ndarray, "*c"]) -> Float[np.ndarray, "*c"]:
         """Returns the parameter at a coordinate."""
@@ -231,6 +233,7 @@ _GRIDS = {
     "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
     "rad/(N·m)": (0.01, 0.03, 0.1, 0.3, 1.0),
 }
+_TEETH = tuple(np.geomspace(0.01, 1.0, 960).tolist())
 _RECIPROCAL = {"N·m": (1.0, 1.2, 1.6), "rad/s": (0.6, 0.9, 1.2, 1.8)}
 
 
@@ -272,6 +275,8 @@ def _slot(
         low = -30.0 if signed else 0.0
         slot = Slot(effect, name, parameter.unit, "linear", scale, 0.0, low, 30.0,
                     0.0, starts, True)  # fmt: skip
+    if effect == "command_quantization":
+        slot = replace(slot, comb=True, starts=_TEETH)
     return slot if figure is None else _known(slot, figure)
 
 
@@ -289,7 +294,8 @@ def _known(slot: Slot, figure: Figure) -> Slot:
         tight = max(tight, DELAY_S / slot.scale)
     starts = slot.starts
     if slot.kind != "log" and not absent:
-        starts = (0.5 * base, 0.8 * base, 1.25 * base, 2.0 * base)
+        near = (0.5 * base, 0.8 * base, 1.25 * base, 2.0 * base)
+        starts = near + tuple(u for u in starts if u > base)
     low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
     return replace(
         slot,

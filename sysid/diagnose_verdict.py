@@ -7,7 +7,9 @@ import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
-from sysid.diagnose_search import THRESHOLD, Model, Search, gain_nat
+from sysid.diagnose_model import Model, gain_nat
+from sysid.diagnose_problem import CHANNELS
+from sysid.diagnose_search import THRESHOLD, Search
 from sysid.diagnose_space import Slot
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
@@ -19,14 +21,20 @@ WIDER = 2.0
 SURE = 3.0
 """Gap below which two effects cannot be told apart [nat]."""
 
-NEARLY = 0.03
+NEARLY = 0.015
 """Share of a cause's gain below which a gap does not decide."""
 
-EXCESS = 1.5
-"""Error over the noise floor above which something is left to explain."""
+EXCESS = 1.3
+"""Squared error over the noise above which something may be left to explain."""
 
-POOR = 0.5
-"""Share of what is removable that causes must remove to be more than a hint."""
+LEFT = 0.15
+"""Share of the removable squared error that a whole explanation may leave."""
+
+DARK = 0.6
+"""Share of the effects that records must hide to tell nothing."""
+
+NESTED = {"coulomb_friction": ("stribeck_friction", "hysteresis")}
+"""Effects that become another one at an end of their shape: they are not its rivals."""
 
 
 def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict:
@@ -43,11 +51,11 @@ def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict
     causes = _causes(searched, mechanism)
     warnings += [w for e in searched for w in warnings_of(e.search)]
     blind = _blind(searched)
-    left = [text for e in searched for text in _left(e, gains[e.track.joint])]
+    left = [text for e in searched for text in _left(e)]
     first = _leading(searched, causes)
-    gain = _main(gains[first.track.joint]) if causes else None
+    gain = _main(gains[first.track.joint], first.search) if causes else None
     rivals = _alternatives(first.search) if causes else ()
-    verdict = _word(causes, rivals, left, gain, searched, blind)
+    verdict = _word(causes, rivals, left, searched, blind)
     return _fields(
         verdict,
         causes=tuple(causes),
@@ -87,24 +95,15 @@ def _gains_of(examined, mechanism: Mechanism, seed: int) -> dict[str, Gain]:
     return residual_gains(examined.search, {**units, "mechanics": torque}, seed)
 
 
-def _word(causes, rivals, left, gain, searched, blind) -> str:
+def _word(causes, rivals, left, searched, blind) -> str:
     """Chooses the verdict."""
-    if causes:
-        if left and gain is not None and gain.explained_fraction < POOR:
-            return "unexplained"
-        same = any(not r.distinguishable for r in rivals)
-        return "ambiguous" if same else "found"
     if left:
         return "unexplained"
-    assumed = {
-        s.effect
-        for e in searched
-        for s in e.search.problem.space.slots
-        if s.kind == "reciprocal" and s.base > 0.0
-    }
+    if causes:
+        same = any(not r.distinguishable for r in rivals)
+        return "ambiguous" if same else "found"
     candidates = len(searched[0].search.problem.space.effects)
-    dark = assumed.intersection(blind) or len(blind) > 0.6 * candidates
-    return "not_observable" if dark else "none"
+    return "not_observable" if len(blind) > DARK * candidates else "none"
 
 
 def _causes(searched, mechanism: Mechanism) -> list[Cause]:
@@ -206,18 +205,17 @@ def _leading(searched, causes):
 def _alternatives(found: Search) -> tuple[Alternative, ...]:
     """Returns the rivals of the strongest cause.
 
-    A rival with more parameters that predicts no better is the cause itself in another
-    dress, as friction over a presliding range of nothing is dry friction.
+    Dry friction over a presliding range of nothing, say, is the cause itself in another
+    dress.
     """
     cause = max(found.best.effects, key=lambda e: _evidence(found, e))
     gain = _evidence(found, cause)
     without = found.without.get(cause, found.base)
-    space, result = found.problem.space, []
+    result = []
     for model in found.rivals.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
         gap = gain - gain_nat(without, model, found.samples)
-        larger = len(space.of(effect)) > len(space.of(cause))
-        told = gap > max(SURE, NEARLY * gain) or (larger and gap > -SURE)
+        told = gap > max(SURE, NEARLY * gain) or effect in NESTED.get(cause, ())
         if np.isfinite(gap) and gap < 0.9 * gain:
             result.append(Alternative(effect, round(gap, 3), bool(told)))
     return tuple(sorted(result, key=lambda a: a.score_gap)[:8])
@@ -265,34 +263,33 @@ def _shapes(effect: str) -> set[str]:
 def _matters(slot: Slot) -> float:
     """Coordinate of the smallest size that would matter."""
     if slot.kind == "reciprocal":
-        return 1.25 * slot.base if slot.base > 0.0 else 1.1
+        return 1.1 * slot.base if slot.base > 0.0 else 1.1
     if slot.kind == "log":
         return slot.base + 0.1
+    if slot.comb:
+        return 0.1
     if slot.starts:
         grid = [u for u in slot.starts if u > 0.0]
         return slot.base + sorted(grid)[len(grid) // 2]
     return slot.base + 0.1
 
 
-def _left(examined, gains: dict[str, Gain]) -> list[str]:
+def _left(examined) -> list[str]:
     """Tells where an error remains that no effect explains."""
-    texts = []
-    for name in ("controller", "mechanics"):
-        gain = gains.get(name)
-        if gain is None or not gain.noise_floor:
-            continue
-        ratio = gain.heldout_rmse_after / gain.noise_floor
-        if ratio > EXCESS:
+    found, texts = examined.search, []
+    for k, name in enumerate(CHANNELS):
+        before, after = found.base.errors[k], found.best.errors[k]
+        if after > EXCESS and after - 1.0 > LEFT * (before - 1.0):
+            times = np.sqrt(after)
             texts.append(
-                f"{examined.track.joint}: the {name} residual is {ratio:.1f} times the "
-                f"noise ({gain.heldout_rmse_after:.3g} {gain.unit})"
+                f"{examined.track.joint}: the {name} residual is {times:.1f} times the "
+                "noise"
             )
     return texts
 
 
-def _main(gains: dict[str, Gain]) -> Gain:
-    """Chooses the gain to tell first: the angle's where it shows, else an effort's."""
-    position = gains.get("position")
-    if position is not None and position.explained_fraction > 0.0:
-        return position
-    return max(gains.values(), key=lambda g: g.explained_fraction)
+def _main(gains: dict[str, Gain], found: Search) -> Gain:
+    """Chooses the gain to tell first: of the residual that differed most."""
+    present = [k for k, name in enumerate(CHANNELS) if name in gains]
+    first = max(present, key=lambda k: found.base.errors[k])
+    return gains[CHANNELS[first]]

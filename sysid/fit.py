@@ -25,6 +25,7 @@ class Task:
         free: indices of those that may change.
         center, deviation: of the prior, for all coordinates.
         low, high: bounds, for all coordinates.
+        steps: of the differences, where a coordinate needs its own; else 0.
     """
 
     start: Float[np.ndarray, " n"]
@@ -33,6 +34,7 @@ class Task:
     deviation: Float[np.ndarray, " n"]
     low: Float[np.ndarray, " n"]
     high: Float[np.ndarray, " n"]
+    steps: Float[np.ndarray, " n"] | None = None
 
     def penalty(self, theta: np.ndarray) -> float:
         """Squared distance from the prior's center."""
@@ -120,6 +122,8 @@ class _State:
     def steps(self, index: int) -> float:
         deviation = self.task.deviation[index]
         step = STEP * min(1.0, max(deviation, 0.02) * 5.0)
+        if self.task.steps is not None and self.task.steps[index] > 0.0:
+            step = float(self.task.steps[index])
         above = self.theta[index] + step > self.task.high[index]
         return -step if above else step
 
