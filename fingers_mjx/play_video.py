@@ -60,7 +60,8 @@ def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
 def _view(qpos: Float[np.ndarray, " nq"], target_w: Target) -> Camera:
     """Returns a view from the front left of where the hand points.
 
-    Where there is a target, it is from farther away and above.
+    Where there is a target, it is from farther away, more ahead and above: the fingers
+    do not hide what they push.
     """
     w, x, y, z = qpos[3:7]
     # The fingers point along the palm's z.
@@ -68,9 +69,9 @@ def _view(qpos: Float[np.ndarray, " nq"], target_w: Target) -> Camera:
     ahead = AHEAD_M * np.array([np.cos(heading), np.sin(heading)])
     return Camera(
         lookat_w=(float(ahead[0]), float(ahead[1]), 0.06),
-        distance_m=0.45 if target_w is None else 0.80,
-        azimuth_deg=float(np.degrees(heading)) + 248.0,
-        elevation_deg=-18.0 if target_w is None else -35.0,
+        distance_m=0.45 if target_w is None else 0.75,
+        azimuth_deg=float(np.degrees(heading)) + (248.0 if target_w is None else 205.0),
+        elevation_deg=-18.0 if target_w is None else -32.0,
     )
 
 
