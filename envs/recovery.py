@@ -175,7 +175,7 @@ class Recovery(BareTask):
         return memory, {
             "gravity_v": self._gravity_v(signals),
             "height_m": signals.palm_pos_w[2] - PALM_MIDDLE_B @ signals.gravity_b,
-            "stance_height_m": self.stance.root_pos_w[2] + PALM_MIDDLE_B @ up_b,
+            "stance_height_m": self.stance.root_pos_w[2] + jnp.dot(PALM_MIDDLE_B, up_b),
             "stance_joint_pos": jnp.array(self.stance.joint_pos_rad),
         }
 
