@@ -140,8 +140,11 @@ class _Rows:
         """Returns the header: joints as asked for, else in the order of their names."""
         commanded = [c.removeprefix("cmd.") for c in columns if c.startswith("cmd.")]
         kept = self.map
+        joints = tuple(kept.joints) or tuple(commanded)
+        if not joints:
+            raise InputError(self.path, self.map.command, "no joint", "names of joints")
         return LogHeader(
-            joints=tuple(kept.joints) or tuple(commanded),
+            joints=joints,
             units=standard_units(columns),
             mounting=kept.mounting,
             palm_quat_w=kept.palm_quat_w,

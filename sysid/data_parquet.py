@@ -12,7 +12,6 @@ from envs.errors import InputError
 from sysid.data import LogHeader, MeasuredLog
 
 METADATA_KEY = b"fingers.measured_log"
-DIGEST_KEY = b"fingers.measured_log.sha256"
 MAX_CELLS = 500_000_000
 _VALID = "a Parquet file with numeric columns"
 
@@ -32,8 +31,7 @@ def read_parquet(path: Path) -> MeasuredLog:
         # `open` keeps to this one file: a path given to pyarrow may name a data set.
         with open(path, "rb") as stream:
             file = pyarrow.parquet.ParquetFile(stream)
-            metadata = file.schema_arrow.metadata or {}
-            header = _header(path, metadata)
+            header, digest = _header(path, file.schema_arrow.metadata or {})
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= MAX_CELLS:
                 raise InputError(path, "", f"{cells} cells", f"at most {MAX_CELLS}")
@@ -44,8 +42,7 @@ def read_parquet(path: Path) -> MeasuredLog:
         raise InputError(path, "columns", ", ".join(columns), "a column t [s]")
     key, t_s = columns.pop("key", None), columns.pop("t")
     log = MeasuredLog(header, t_s, columns, key, str(path))
-    digest = metadata.get(DIGEST_KEY, log.sha256.encode())
-    if digest != log.sha256.encode():
+    if digest not in ("", log.sha256):
         valid = "what was written; copy the file again"
         raise InputError(path, "sha256", "other contents", valid)
     return log
@@ -64,10 +61,9 @@ def write_parquet(log: MeasuredLog, path: Path) -> None:
     columns = {k: pyarrow.array(v, mask=np.isnan(v)) for k, v in columns.items()}
     if log.key is not None:
         columns["key"] = pyarrow.array(log.key.tolist(), pyarrow.string())
-    header = json.dumps(to_dict(log.header), ensure_ascii=False).encode()
-    table = pyarrow.table(columns).replace_schema_metadata(
-        {METADATA_KEY: header, DIGEST_KEY: log.sha256.encode()}
-    )
+    header = {**to_dict(log.header), "sha256": log.sha256}
+    text = json.dumps(header, ensure_ascii=False).encode()
+    table = pyarrow.table(columns).replace_schema_metadata({METADATA_KEY: text})
     part = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         pyarrow.parquet.write_table(table, part)
@@ -76,8 +72,8 @@ def write_parquet(log: MeasuredLog, path: Path) -> None:
         part.unlink(missing_ok=True)
 
 
-def _header(path: Path, metadata: dict[bytes, bytes]) -> LogHeader:
-    """Reads the header from the metadata of the schema."""
+def _header(path: Path, metadata: dict[bytes, bytes]) -> tuple[LogHeader, str]:
+    """Reads header and digest ("" if there is none) from the metadata of the schema."""
     field = METADATA_KEY.decode()
     if METADATA_KEY not in metadata:
         raise InputError(path, f"metadata {field}", "", "the header of a log as JSON")
@@ -85,7 +81,8 @@ def _header(path: Path, metadata: dict[bytes, bytes]) -> LogHeader:
         data = json.loads(metadata[METADATA_KEY])
     except (ValueError, RecursionError) as error:
         raise InputError(path, f"metadata {field}", error, "JSON") from error
-    return from_dict(LogHeader, data, path)
+    digest = data.pop("sha256", "") if isinstance(data, dict) else ""
+    return from_dict(LogHeader, data, path), digest
 
 
 def _columns(path: Path, table: Any) -> dict[str, np.ndarray]:
