@@ -188,7 +188,9 @@ def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> 
         if all(known.get(name, False) for name in kind.needs):
             figures = _figures(drive, effect, track)
             for name, parameter in kind.parameters.items():
-                slots.append(_slot(effect, name, parameter, figures.get(name), sizes))
+                figure = figures.get(name)
+                made = _slot(effect, name, parameter, figure, sizes, track.slide)
+                slots.append(made)
     return Space(tuple(slots))
 
 
@@ -243,6 +245,7 @@ def _slot(
     parameter: Parameter,
     figure: Figure | None,
     sizes: dict[str, float],
+    slide: bool,
 ) -> Slot:
     """Makes the coordinate of one parameter."""
     prior, identity = parameter.prior, parameter.identity
@@ -277,7 +280,17 @@ def _slot(
                     0.0, starts, True)  # fmt: skip
     if effect == "command_quantization":
         slot = replace(slot, comb=True, starts=_TEETH)
+    slot = slot if slide else _bounded(slot, parameter)
     return slot if figure is None else _known(slot, figure)
+
+
+def _bounded(slot: Slot, parameter: Parameter) -> Slot:
+    """Keeps a coordinate within the range of its parameter."""
+    if slot.kind == "reciprocal":
+        return replace(slot, high=min(slot.high, slot.coordinate(parameter.low)))
+    ends = [slot.coordinate(x) if x != 0.0 or slot.kind == "linear" else slot.low
+            for x in (parameter.low, parameter.high)]  # fmt: skip
+    return replace(slot, low=max(slot.low, ends[0]), high=min(slot.high, ends[1]))
 
 
 def _known(slot: Slot, figure: Figure) -> Slot:

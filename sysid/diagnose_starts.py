@@ -21,9 +21,10 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     kept = [i for e in model.effects for i in problem.space.of(e)]
     nominal[kept] = fitted[kept]
     for origin, count in ((fitted, 2), (nominal, 1)):
-        owned = [(n, t) for n in names for t in _tried(problem, model, origin, n)]
+        some = names if count == 2 else [n for n in names if not _comb(problem, n)]
+        owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
         costs = _linear_costs(problem, model, np.stack([t for _, t in owned]))
-        for name in names:
+        for name in some:
             mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
             few = count if len(mine) > 2 else 1
             best = sorted(mine, key=lambda k: costs[k])[:few]
@@ -38,9 +39,9 @@ def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> lis
         theta = origin.copy()
         theta[list(start)] = list(start.values())
         starts.append(theta)
-    index = problem.space.of(name)[0]
-    if not problem.space.slots[index].comb:
+    if not _comb(problem, name):
         return starts
+    index = problem.space.of(name)[0]
     for spread in COMB:
         costs = _linear_costs(problem, model, np.stack(starts))
         best = starts[int(np.argmin(costs))]
@@ -49,6 +50,10 @@ def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> lis
             theta[index] *= factor
             starts.append(theta)
     return starts
+
+
+def _comb(problem: Problem, name: str) -> bool:
+    return problem.space.slots[problem.space.of(name)[0]].comb
 
 
 def _linear_costs(problem: Problem, model: Model, thetas: np.ndarray) -> np.ndarray:

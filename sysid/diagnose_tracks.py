@@ -33,6 +33,7 @@ class JointTrack:
         start_s: time at which a piece starts [s].
         effort: whether the effort was logged, for every piece.
         noise: white noise of angle [rad] and effort [N·m] per step of the grid.
+        slide: whether the joint moves along a line: units are m and N.
         friction_speed: speed below which the joint may be at rest.
         torque_scale, speed_scale, angle_scale, acc_scale: sizes that occur.
     """
@@ -49,6 +50,7 @@ class JointTrack:
     effort: Bool[np.ndarray, " p"]
     noise: tuple[float, float]
     friction_speed: float
+    slide: bool
     torque_scale: float
     speed_scale: float
     angle_scale: float
@@ -165,6 +167,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         effort=logged,
         noise=noise,
         friction_speed=at_rest,
+        slide=mechanism.is_slide(joint),
         torque_scale=max(float(np.percentile(np.abs(torque), 98)), 1e-9),
         speed_scale=max(speed, 1e-9),
         angle_scale=max(
