@@ -1,10 +1,13 @@
 """The hand model file with what a diagnosis found in it, ready to train on."""
 
 import dataclasses
+from collections.abc import Callable
 
 import numpy as np
 
+from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, HandFile, JointQuantity, Quantity
+from sysid.diagnose_tracks import neighbour
 from sysid.diagnosis import Cause, Diagnosis, Estimate
 from sysid.mechanism import Mechanism, hand_mechanism
 
@@ -47,9 +50,58 @@ def _with_cause(
         return dataclasses.replace(hand, **{name: figure})
     if cause.effect in _PER_JOINT:
         return _scaled(hand, cause, mechanism, source)
-    found = {k: _quantity(v, source) for k, v in cause.parameters.items()}
-    added = Effect(cause.effect, found, (cause.where,))
+    found = {
+        name: _within(cause.effect, name, _beside(hand, cause.effect, value), source)
+        for name, value in cause.parameters.items()
+    }
+    other = _neighbour_of(cause, mechanism) if cause.effect == "joint_coupling" else ""
+    whole = CATALOGUE[cause.effect].scope == "hand"
+    if whole and cause.effect in (effect.name for effect in hand.effects):
+        return hand  # the joint that shows it best has told it
+    where = "all" if whole else cause.where
+    added = Effect(cause.effect, found, (where,), other)
     return dataclasses.replace(hand, effects=(*hand.effects, added))
+
+
+def _beside(hand: HandFile, effect: str, estimate: Estimate) -> Estimate:
+    """Returns what a delay or filter of some joints adds to that of the whole hand."""
+    if effect == "transport_delay":
+        return _changed(estimate, lambda x: x - hand.delay_s.value)
+    if effect == "lowpass_cutoff":
+        # Time constants of two filters in a row add up, to first order.
+        rest = 1.0 / hand.lowpass_hz.value
+        return _changed(estimate, lambda x: 1.0 / max(1.0 / x - rest, 1e-9))
+    return estimate
+
+
+def _changed(estimate: Estimate, change: Callable[[float], float]) -> Estimate:
+    value, low, high = map(change, (estimate.value, estimate.low, estimate.high))
+    return Estimate(value, min(low, high), max(low, high), estimate.unit)
+
+
+def _within(effect: str, name: str, estimate: Estimate, source: str) -> Quantity:
+    """Returns a figure inside the range that training takes, and says if it was not."""
+    parameter = CATALOGUE[effect].parameters[name]
+
+    def clipped(x: float) -> float:
+        return min(max(x, parameter.low), parameter.high)
+
+    value, low, high = estimate.value, estimate.low, estimate.high
+    note = "" if clipped(value) == value else f"found {value:.6g}, outside of the range"
+    return Quantity(
+        clipped(value),
+        estimate.unit,
+        source,
+        clipped(min(low, value)),
+        clipped(max(high, value)),
+        note,
+    )
+
+
+def _neighbour_of(cause: Cause, mechanism: Mechanism) -> str:
+    """Returns the joint whose angle pulls a coupled joint."""
+    joints = mechanism.joints
+    return joints[neighbour(mechanism.model, joints, joints.index(cause.where))]
 
 
 def _scaled(

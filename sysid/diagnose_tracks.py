@@ -105,7 +105,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     efforts = [scale * p.effort[:, j] for p in pieces]
     logged = np.array([not np.any(np.isnan(e)) for e in efforts])
     slow = [smoothed(p.vel[:, j], BAND_STEPS) for p in pieces]
-    neighbour = _neighbour(mechanism.model, logs[0].header.joints, j)
+    beside = neighbour(mechanism.model, logs[0].header.joints, j)
     nm = [np.nan_to_num(scale * p.effort) for p in pieces]
     factor = [
         logs[p.log].header.settings.get(drive.kp_setting, 1.0)
@@ -131,8 +131,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         payload_shift=stack([b.payload_shift[:, j] for b in bodies]),
         payload_inertia=stack([b.payload_inertia[:, j] for b in bodies]),
         others_nm=stack([np.abs(e).sum(1) - np.abs(e[:, j]) for e in nm]),
-        other_q=stack([p.pos[:, neighbour] for p in pieces]),
-        other_nm=stack([e[:, neighbour] for e in nm]),
+        other_q=stack([p.pos[:, beside] for p in pieces]),
+        other_nm=stack([e[:, beside] for e in nm]),
         gravity=np.stack([b.gravity for b in bodies]),
         payload_kg=np.array([b.payload_kg[j] for b in bodies]),
         kp=drive.kp.value * np.array(factor),
@@ -182,7 +182,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     )
 
 
-def _neighbour(model, joints: tuple[str, ...], j: int) -> int:
+def neighbour(model, joints: tuple[str, ...], j: int) -> int:
     """Returns the joint on the parent's body, else on a child's, else itself."""
     body = [int(model.jnt_bodyid[model.joint(n).id]) for n in joints]
     parents = [int(model.body_parentid[b]) for b in body]
