@@ -196,6 +196,8 @@ class Lab:
             wiggle=wiggle,
         )
         self.number = 0
+        self.between: Callable[[], None] = lambda: None
+        """What else happens in the world before each step."""
         self.events: list[tuple[float, str]] = []
         self.modes: list[tuple[float, Mode]] = []
 
@@ -208,6 +210,7 @@ class Lab:
         """One step of the loop, after `skip` that were missed."""
         self.number += 1 + skip
         self.clock.t = self.number * self.period_s
+        self.between()
         out = self.core.tick(Tick(self.number, self.clock.t, 0.0, skip), operator)
         self.events += [(self.clock.t, line) for line in out.events]
         if not self.modes or self.modes[-1][1] != self.mode:

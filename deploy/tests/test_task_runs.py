@@ -1,0 +1,28 @@
+"""The committed policies of other tasks under the supervisor, in their scenes."""
+
+import pytest
+from task_runs import push_cube, type_keys
+
+from envs.keyboard_model import ARROWS
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("scenes")
+
+
+def test_keys_are_typed_one_by_one(folder):
+    typed = type_keys(folder, ARROWS, seed=0)
+    assert typed["keys"] == 4 and typed["correct"] >= 3 and typed["faults"] == []
+
+
+def test_a_cube_is_pushed_by_what_a_camera_sends(folder):
+    """With the rows off that the policy's effort trips; the next test has them on."""
+    pushed = push_cube(folder, seed=2, watched=False)
+    assert pushed["delivered"] and pushed["faults"] == []
+
+
+def test_a_push_policy_at_the_limit_of_its_efforts_is_stopped(folder):
+    pushed = push_cube(folder, seed=2)
+    strains = pushed["at_effort_limit"] > 0.5
+    assert bool(set(pushed["faults"]) & {"S5", "S8b"}) == strains
