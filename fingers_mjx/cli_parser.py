@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from fingers_mjx.cli_parser_sysid import add_calibrate, add_diagnose, add_excite
+from fingers_mjx.cli_parser_transfer import add_transfer
 
 MAX_SEED = 2**32 - 1
 STANCE_STARTS = 40
@@ -286,6 +287,7 @@ def _sysid(commands) -> None:
     add_excite(actions, whole, number)
     add_calibrate(actions)
     add_diagnose(actions, whole, number)
+    add_transfer(actions, whole, _settings, _backend)
 
 
 def _demo(commands) -> None:
