@@ -87,9 +87,13 @@ def pieces_of(
         Its pieces, without those that are too short.
     """
     pieces = []
+    periods = [column_timing(log, f"pos.{joint}").period_s for joint in joints]
+    every = max(1, round(step_s / min(periods)))
     for start, stop in _spans(log, f"pos.{next(iter(joints))}"):
         if stop - start >= MIN_PIECE_S:
-            parts = [_joint(log, j, joints[j], start, stop, step_s) for j in joints]
+            parts = [
+                _joint(log, j, joints[j], start, stop, step_s, every) for j in joints
+            ]
             kept = [part for part in parts if part is not None]
             if len(kept) == len(parts):
                 stacked = {k: np.stack([p[k] for p in kept], -1) for k in kept[0]}
@@ -126,13 +130,12 @@ def _joined(spans: list, period_s: float) -> list[tuple[float, float]]:
     return joined
 
 
-def _joint(log, joint, effort, start, stop, step_s) -> dict | None:
+def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
     """Puts one joint of one stretch on the grid."""
     names = {"cmd": f"cmd.{joint}", "pos": f"pos.{joint}"}
     names |= {"effort": f"{effort}.{joint}", "ext": f"ext.{joint}"}
     names = {key: name for key, name in names.items() if name in log.columns}
     period = column_timing(log, names["pos"]).period_s
-    every = max(1, round(step_s / period))
     fine_s = step_s / every
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
     columns, valid = {}, np.ones(len(fine), bool)

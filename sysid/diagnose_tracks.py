@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from envs.errors import InputError, one_of
 from sysid.data import MeasuredLog
 from sysid.diagnose_bodies import bodies_along
+from sysid.diagnose_checks import check_records
 from sysid.diagnose_doubt import sampling_doubt, timing_doubt
 from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
 from sysid.diagnose_records import SMOOTH_STEPS, Piece, grid_step_s, pieces_of, smoothed
@@ -75,6 +76,7 @@ def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointT
         if joint not in mechanism.drives:
             valid = one_of(mechanism.drives, joint)
             raise InputError(logs[0].source, "joints", joint, valid)
+    check_records(logs, mechanism)
     step_s = grid_step_s(logs, joints)
     efforts = {joint: mechanism.drives[joint].effort for joint in joints}
     pieces = [
