@@ -1,13 +1,15 @@
-"""Typing and pushing under the supervisor: keys asked for, a camera's samples sent.
+"""Typing, pushing and stopping under the supervisor.
 
     python deploy/benchmarks/task_runs.py --trials 10
 
-Everything is the shim's own code, as in `fault_lab`; the scenes are those of training,
-the camera's samples go through the socket, 60 of them a second and 40 ms late. Pushing
-is tried as it is, and with the rows on effort and tracking (S5, S8b) off.
+Everything is the shim's own code, as in `fault_lab`; the scenes are those of training;
+keys are asked for, their events come from the scene; a camera's samples go through the
+socket, 60 of them a second and 40 ms late. Pushing is tried as it is, and with the rows
+on effort and tracking (S5, S8b) off. A hand that walks is stopped by the operator.
 """
 
 import argparse
+import copy
 import json
 import socket
 import sys
@@ -18,20 +20,23 @@ from pathlib import Path
 import mujoco
 import numpy as np
 from fault_lab import Lab
-from hand_files import WALKING
+from hand_files import WALKING, write_model
 
 from envs.keyboard_model import ACTUATION_M, ARROWS
 from envs.push_scene import HALF_M
 from envs.registry import make_batch
+from fingers_deploy.behaviour.command import FixedCommand
 from fingers_deploy.behaviour.key_runner import KeyRunner
 from fingers_deploy.behaviour.tracker_port import TrackerPort
+from fingers_deploy.behaviour.upright import tilt_angle
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.rotations import heading, multiply
-from fingers_deploy.safety import Mode
+from fingers_deploy.safety import Mode, Operator
 
 POLICIES = WALKING.parent
 CAMERA_S, LATE_S, CONTROL_S = 1 / 60, 0.04, 0.02
 ENTER_M = 0.02
+FALLEN_RAD, STOPS = 0.7, 24
 
 
 class TypedOn:
@@ -149,6 +154,32 @@ class Camera:
         }
 
 
+def stop_walking(folder: Path, wait_s: float, trials: int) -> dict:
+    """Stops at full speed, at `trials` phases of the gait; returns how many fell.
+
+    Args:
+        folder: for the model.
+        wait_s: time without a command before the operator's stop.
+        trials: how often.
+    """
+    model = write_model(folder / "hand.xml")
+    lab = Lab(model, (load_bundle(WALKING),), sticks=(1.0, 0.0, 0.0), loop_hz=250)
+    lab.activate().run(2.5)
+    falls = 0
+    for _ in range(trials):
+        stopped = copy.deepcopy(lab.run(0.11))
+        if wait_s:
+            stopped.link.policies.sources.command = FixedCommand(())
+            stopped.run(wait_s)
+        stopped.tick(Operator.STOP)
+        stopped.run(2.2)
+        level = tilt_angle(
+            stopped.driver.hand.data.qpos[3:7], stopped.core.limits.v_quat_b
+        )
+        falls += level > FALLEN_RAD
+    return {"wait_s": wait_s, "stops": trials, "falls": falls}
+
+
 def _place_cube(lab: Lab, rng: np.random.Generator) -> np.ndarray:
     """Puts the cube before the hand; returns its target, [2]."""
     qpos = lab.driver.hand.data.qpos
@@ -180,6 +211,9 @@ def main() -> int:
             "push": [push_cube(folder, k) for k in range(options.trials)],
             "push, S5 and S8b off": [
                 push_cube(folder, k, watched=False) for k in range(options.trials)
+            ],
+            "stop at full speed": [
+                stop_walking(folder, wait_s, STOPS) for wait_s in (0.0, 0.5)
             ],
         }
     print(json.dumps(results, indent=1))

@@ -200,6 +200,16 @@ def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
     process.stderr.close()
 
 
+def test_a_reader_that_goes_away_gets_no_traceback(bundle_dir):
+    program = [sys.executable, "-u", "-m", "fingers_deploy", "check", str(bundle_dir)]
+    process = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.readline()
+    process.stdout.close()
+    assert process.stderr.read() == b""
+    assert process.wait(timeout=60) == 1
+    process.stderr.close()
+
+
 def test_help_says_what_there_is():
     said = _run("--help").stdout
     for word in ("check", "run", "record", "guard", "log"):
