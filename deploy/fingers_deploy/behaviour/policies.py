@@ -151,8 +151,11 @@ class Policies:
 
     def _settle(self, stances: tuple[int, ...], target: Array, t: float) -> None:
         """Begins the ramp to the first of these policies' stances."""
-        interface = self._interface(stances[0])
-        self._ramp = settle_ramp(t, target, interface.initial_target_rad, interface)
+        goal = self._interface(stances[0]).initial_target_rad
+        # The supervisor allows each policy its own α: a ramp keeps to the smallest.
+        interfaces = (c.bundle.manifest.interface for c in self._controllers)
+        slowest = min(interfaces, key=lambda interface: interface.action.scale_rad)
+        self._ramp = settle_ramp(t, target, goal, slowest)
         self._stances = stances[1:]
 
     def _hand_over(self, number: int, target: Array) -> None:

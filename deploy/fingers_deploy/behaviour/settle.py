@@ -53,7 +53,7 @@ def settle_ramp(
         t: monotonic time [s].
         target: targets on the wire [rad], [20].
         goal: targets that hold the stance [rad], [20].
-        interface: of the policy to whose stance it leads.
+        interface: of a policy, for α and the control rate.
     """
     start, end = np.asarray(target, np.float64), np.asarray(goal, np.float64)
     speed = SPEED_SHARE * interface.action.scale_rad * interface.control_rate_hz

@@ -37,10 +37,9 @@ _SHARED = (
 def make_all_limits(
     bundles: Sequence[Bundle], driver: Driver, dry_run: bool
 ) -> tuple[Limits, ...]:
-    """Limits of each policy; all may move the targets as fast as the fastest."""
+    """Limits of each policy."""
     factory = driver.info.joint_limits_rad
-    fastest = max(b.manifest.interface.action.scale_rad for b in bundles)
-    limits = tuple(make_limits(b.manifest, factory, step_rad=fastest) for b in bundles)
+    limits = tuple(make_limits(b.manifest, factory) for b in bundles)
     return tuple(x.without_motion() for x in limits) if dry_run else limits
 
 
