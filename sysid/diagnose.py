@@ -84,14 +84,27 @@ def _examined(
     track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism
 ) -> Examined:
     """Searches one joint, if it moved."""
-    drive = mechanism.drives[track.joint]
     moved = np.ptp(np.asarray(track.track.cmd)) > LEAST_MOTION
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)
     alone = not np.any(np.asarray(track.track.others_nm))
-    known = {"others_nm": True, "gravity": True, "other_q": not alone}
-    known["other_nm"] = known["other_q"]
-    problem = make_problem(track, make_space(track, drive, known), logs, drive.known)
-    result = search(problem)
+    result = search(problem_of(track, logs, mechanism, not alone))
     return Examined(track, result.problem, result)
+
+
+def problem_of(
+    track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism, company: bool
+) -> Problem:
+    """Makes the problem of a joint.
+
+    Args:
+        track: its measured motion.
+        logs: the records.
+        mechanism: the simulation as it stands.
+        company: whether other joints move too.
+    """
+    drive = mechanism.drives[track.joint]
+    known = {"others_nm": True, "gravity": True, "other_q": company}
+    known["other_nm"] = known["other_q"]
+    return make_problem(track, make_space(track, drive, known), logs, drive.known)

@@ -131,6 +131,17 @@ def _enter(params, state, x, dt):
     return x.torque, x.replace(torque=mixed)
 
 
+def _read(params, state, x, dt):
+    """Remembers what the encoder would tell, and lets the servo have what it told."""
+    told = x.replace(encoder=params["angle"], encoder_speed=params["speed"])
+    return (x.encoder, x.encoder_speed), told
+
+
+_READ = _pseudo(
+    "measured_angle",
+    {Stage.ENCODER: _read},
+    lambda params, target, q, dt: (jnp.zeros_like(q), jnp.zeros_like(q)),
+)
 _SLOW = _pseudo("slow_speed", {Stage.FRICTION: _slow})
 _ENTER = _pseudo(
     "measured_effort",
@@ -187,10 +198,12 @@ def forced_residuals(
         enter = {"effort": effort, "measured": track.measured[:, None]}
         slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
         body = tuple((_RIGID[n], p) for n, p in wide.items())
-        return ((_SLOW, slow), *body, (_ENTER, enter))
+        angle = now["pos"] + skew * now["vel"]
+        read = {"angle": angle, "speed": now["vel"] + skew * now["acc"]}
+        return ((_SLOW, slow), *body, (_READ, read), (_ENTER, enter))
 
     def step(carry, row):
-        states, shift, shift_speed, behind = carry
+        states, shift, shift_speed, steep, behind = carry
         row, target = row
         now = {k: v[:, None] for k, v in row.items()}
         q = now["pos"] + skew * now["vel"] - shift
@@ -220,9 +233,15 @@ def forced_residuals(
         inertia = mass * now["inertia"] + x.inertia
         loud, usual = _loudness(track, now, x, gain, inertia)
         own = jnp.minimum(rotor, 0.9 * inertia)
-        force = x.passive + x.load - (inertia - own) * now["acc"]
+        # What encoders make of angles is as steep for speeds and accelerations.
+        moves = jnp.abs(qd) > 1e-6
+        encoder, speed = states[-2]
+        ratio = speed / (qd + 1.0 * ~moves)
+        steep = ratio * moves + steep * ~moves
+        acc = now["acc"] / steep
+        force = x.passive + x.load - (inertia - own) * acc
         behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
-        needs = x.torque - own * now["acc"] + pull
+        needs = x.torque - own * acc + pull
         unit = gain * loud[1] / usual[1]
         quiet = loud[0] / usual[0]
         out = {
@@ -233,14 +252,14 @@ def forced_residuals(
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
         }
-        return (states, x.encoder - q, x.encoder_speed - qd, behind), out
+        return (states, encoder - q, speed - qd, steep, behind), out
 
     rows = {k: getattr(track, k) for k in _STEPWISE}
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
     none = jnp.zeros_like(q0)
     states = init_states(model(first), path[0], q0, dt)
-    start = (states, none, none, (none, none))
+    start = (states, none, none, none + 1.0, (none, none))
     out = jax.lax.scan(step, start, (rows, path))[1]
     return _filtered(
         out | {"command": path}, track.slow_vel[:, :, None], friction_speed

@@ -68,7 +68,7 @@ def search(problem: Problem) -> Search:
 
     Without repeats it runs again with what the first result leaves as noise.
     """
-    problem, base = _settled(problem)
+    problem, base = settled(problem)
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found
@@ -84,7 +84,7 @@ def _searched(problem: Problem, base: Model) -> Search:
     best = base
     rivals: dict[str, list[Model]] = {}
     for _ in range(MOST):
-        stage = _extended(problem, best)
+        stage = extended(problem, best)
         if not stage:
             break
         winner = stage[0]
@@ -118,7 +118,7 @@ def _worth(problem: Problem, smaller: Model, larger: Model, samples: int) -> boo
     return gain > THRESHOLD and (share > LEAST_SHARE or told)
 
 
-def _settled(problem: Problem) -> tuple[Problem, Model]:
+def settled(problem: Problem) -> tuple[Problem, Model]:
     """Fits the nuisances and estimates the noise, twice."""
     theta = problem.space.base
     for _ in range(3):
@@ -128,7 +128,7 @@ def _settled(problem: Problem) -> tuple[Problem, Model]:
     return problem, model
 
 
-def _extended(problem: Problem, model: Model) -> list[Model]:
+def extended(problem: Problem, model: Model) -> list[Model]:
     """Adds every effect that a model lacks, best first."""
     names = [e for e in problem.space.effects if e not in model.effects]
     sets = [(*model.effects, name) for name in names]
@@ -194,6 +194,6 @@ def _swapped(
     for cause in best.effects:
         rest = tuple(e for e in best.effects if e != cause)
         without[cause] = fit_models(problem, [rest], [best.fit.theta])[0]
-        stage = _extended(problem, without[cause])
+        stage = extended(problem, without[cause])
         rivals[cause] = [m for m in stage if cause not in m.effects]
     return rivals, without

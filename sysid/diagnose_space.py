@@ -55,6 +55,7 @@ class Slot:
         tight: prior deviation; 0: fixed unless released; inf: free.
         starts: coordinates from which a search begins.
         vanishes: whether the effect is absent at `base`.
+        wide: prior deviation once it is released.
         comb: whether it has many optima beside each other, as the step of a grid has.
     """
 
@@ -70,6 +71,7 @@ class Slot:
     starts: tuple[float, ...]
     vanishes: bool
     comb: bool = False
+    wide: float = 5.0
 
     def value(self, u: Float[np.ndarray, "*c"]) -> Float[np.ndarray, "*c"]:
         """Returns the parameter at a coordinate."""
@@ -120,7 +122,10 @@ class Space:
     def deviations(self, released: Sequence[str]) -> Float[np.ndarray, " n"]:
         """Prior deviations with some effects released; 0 for what stays fixed."""
         return np.array(
-            [_FREE if s.effect in released else min(s.tight, _FREE) for s in self.slots]
+            [
+                s.wide if s.effect in released else min(s.tight, _FREE)
+                for s in self.slots
+            ]
         )
 
     def starts(self, effect: str) -> list[dict[int, float]]:
@@ -265,7 +270,8 @@ def _slot(
                     0.0, starts, True)  # fmt: skip
     elif identity == 1.0:
         slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,
-                    (-0.3, 0.3), True)  # fmt: skip
+                    (-0.3, -0.05, 0.05, 0.3), True)  # fmt: skip
+        slot = replace(slot, wide=3.0 * math.log(prior.spread))
     else:
         scale = size
         if scale is None:

@@ -24,7 +24,7 @@ SURE = 3.0
 NEARLY = 0.015
 """Share of a cause's gain below which a gap does not decide."""
 
-EXCESS = 1.3
+EXCESS = 1.5
 """Squared error over the noise above which something may be left to explain."""
 
 LEFT = 0.15

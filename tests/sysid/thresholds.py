@@ -1,0 +1,67 @@
+"""From which gain on is an effect more than chance? Effect-free records tell.
+
+    PYTHONPATH=.:tests python tests/sysid/thresholds.py --seed 1 --records 100
+
+Every effect is added to the simulation of effect-free records, as a search does first.
+Printed are the largest gains of a record, apart for figures that the simulation has and
+for effects that it lacks, and the gains that 5 % of the records exceed.
+"""
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+from hidden.believed import believed
+from hidden.cases import draw_case
+
+from sysid.diagnose import problem_of
+from sysid.diagnose_model import fit_models, gain_nat
+from sysid.diagnose_search import extended, settled
+from sysid.diagnose_tracks import all_tracks
+
+
+def largest_gains(seed: int) -> dict:
+    """Returns the largest gains on one effect-free record [nat], by class."""
+    case = draw_case(seed, (), "medium", ("pendulum", "joint")[seed % 2])
+    mechanism = believed(case.stand)
+    tracks = all_tracks(case.logs, mechanism)
+    track = next(t for t in tracks if t.joint == case.joint)
+    problem = problem_of(track, case.logs, mechanism, len(case.stand.moved) > 1)
+    problem, base = settled(problem)
+    stage = extended(problem, base)
+    again = fit_models(problem, [()] * 3, [m.fit.theta for m in stage[:3]])
+    base = min([base, *again], key=lambda m: m.fit.cost)
+    samples = int(problem.counts().sum())
+    best = {"figure": (0.0, ""), "effect": (0.0, "")}
+    for model in stage:
+        name = model.effects[-1]
+        kind = "figure" if problem.space.figured(name) else "effect"
+        best[kind] = max(best[kind], (gain_nat(base, model, samples), name))
+    return {"seed": seed, **best, "left": max(base.errors.tolist())}
+
+
+def main() -> None:
+    """Runs from the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--records", type=int, default=100)
+    parser.add_argument("--out", type=Path, default=Path("build/thresholds.jsonl"))
+    args = parser.parse_args()
+    args.out.parent.mkdir(parents=True, exist_ok=True)
+    rows = []
+    with open(args.out, "a") as file:
+        for number in range(args.records):
+            rows.append(largest_gains(1000 * args.seed + number))
+            file.write(json.dumps(rows[-1]) + "\n")
+            file.flush()
+            print(rows[-1], flush=True)
+    for kind in ("figure", "effect"):
+        gains = [row[kind][0] for row in rows]
+        print(
+            f"{kind}: 95 % below {np.quantile(gains, 0.95):.1f}, all {max(gains):.1f}"
+        )
+
+
+if __name__ == "__main__":
+    main()
