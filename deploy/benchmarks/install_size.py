@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROBOT = "aarch64-manylinux_2_28"
 DEBIAN = ("python3-numpy", "libblas3", "liblapack3", "libgfortran5", "libquadmath0")
-ONNX = ("onnxruntime", "flatbuffers", "packaging", "protobuf")
+ONNX = ("onnxruntime<1.29", "flatbuffers", "packaging", "protobuf")
 DEPLOY = Path(__file__).parents[1]
 _IMPORT = """
 import time

@@ -62,7 +62,7 @@ PARTS = (
         ("fuzz_bundles.py", "--count", "120"),
     ),
     _faults("matrix", ("--trials", "100"), ("--trials", "1")),
-    _faults("starts", ("--start-trials", "20"), ("--start-trials", "1")),
+    _faults("starts", ("--start-trials", "100"), ("--start-trials", "1")),
     _faults("links", ("--loss-s", "600"), ("--loss-s", "2")),
     _faults("fault_free", ("--hours", "1"), ("--hours", "0.003")),
     Part(
@@ -72,7 +72,7 @@ PARTS = (
         prints=False,
     ),
     # In real time from here on.
-    _faults("processes", ("--process-trials", "20"), ("--process-trials", "1")),
+    _faults("processes", ("--process-trials", "50"), ("--process-trials", "1")),
     _loop("L1", 10),
     _loop("L1 plain", 10, "--no-realtime"),
     _loop("L2", 10, "--load", "2"),
