@@ -6,6 +6,7 @@ from envs.config import load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli_sysid_excite import mechanism_of
+from fingers_mjx.cli_sysid_walk import run_walk, walks
 from fingers_mjx.evaluate_files import write_atomic
 from sysid.data_bag import BagMap
 from sysid.data_read import read_log
@@ -23,6 +24,8 @@ def run(args: argparse.Namespace) -> int:
         read_log(path, bag_map if path.is_dir() or path.suffix == ".mcap" else None)
         for path in args.logs
     ]
+    if walks(logs):
+        return run_walk(args, logs, mechanism.hand)
     diagnosis, examined = examine(logs, mechanism, args.seed)
     args.out.mkdir(parents=True, exist_ok=True)
     text = diagnosis.to_json() + "\n"

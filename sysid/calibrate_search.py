@@ -17,7 +17,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import t as student
 
-_STEP, _ROUNDS, _ENOUGH = 0.01, 30, 0.02
 _TRIED = np.array([0.1, 1.0, 30.0, 1e3])
 
 Residual = Callable[[Float[np.ndarray, "c n"]], Float[np.ndarray, "c r"]]
@@ -32,6 +31,10 @@ class Search:
         residuals: of many candidates at once.
         center, deviation: of the prior.
         low, high: bounds.
+        step: of differences, in units of the parameters.
+        rounds: steps at most.
+        enough: gain of a step below which the search ends.
+        reach: largest change of a parameter in one step.
     """
 
     residuals: Residual
@@ -39,6 +42,10 @@ class Search:
     deviation: Float[np.ndarray, " n"]
     low: Float[np.ndarray, " n"]
     high: Float[np.ndarray, " n"]
+    step: float = 0.01
+    rounds: int = 30
+    enough: float = 0.02
+    reach: float = 1.0
 
     def cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
         """Value that is minimized."""
@@ -52,14 +59,14 @@ class Search:
 
     def linear(self, theta: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Residual and its Jacobian by central differences."""
-        step, n = _STEP * np.eye(len(theta)), len(theta)
+        step, n = self.step * np.eye(len(theta)), len(theta)
         both = self.residuals(np.concatenate([theta[None], theta + step, theta - step]))
-        return both[0], (both[1 : n + 1] - both[n + 1 :]).T / (2.0 * _STEP)
+        return both[0], (both[1 : n + 1] - both[n + 1 :]).T / (2.0 * self.step)
 
     def solved(self, theta: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
         """Goes downhill from θ."""
         damping = 1e-3
-        for _ in range(_ROUNDS):
+        for _ in range(self.rounds):
             r, jac = self.linear(theta)
             gram = jac.T @ jac + np.diag(self.deviation**-2.0)
             slope = jac.T @ r + (theta - self.center) / self.deviation**2
@@ -67,7 +74,9 @@ class Search:
             steps = [
                 _step(gram + d * np.diag(np.diag(gram)), slope, free) for d in tries
             ]
-            thetas = np.clip(theta + np.clip(steps, -1.0, 1.0), self.low, self.high)
+            thetas = np.clip(
+                theta + np.clip(steps, -self.reach, self.reach), self.low, self.high
+            )
             found = self.residuals(thetas)
             costs = [self.cost(x, y) for x, y in zip(thetas, found, strict=True)]
             best = int(np.argmin(costs))
@@ -78,7 +87,7 @@ class Search:
                     break
                 continue
             theta, damping = thetas[best], max(float(tries[best]), 1e-7)
-            if gain < _ENOUGH:
+            if gain < self.enough:
                 break
         return theta
 

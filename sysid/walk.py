@@ -1,0 +1,201 @@
+"""Names what is wrong with a hand that walks, from a minute of its log.
+
+    diagnosis = diagnose_walk(read_log("walk.parquet"), env)
+
+Every hypothesis of `sysid.walk_space` is fitted on half of the walk, in stretches of
+five seconds, and judged on the other half, and the other way round:
+
+    r = [short walks missed, gyro − turning − b, R g − down(tilt)] / scatter
+
+First all along the tangent at the hand as simulated, then the best few in full. The
+friction of the fingertips is fitted along in all of them.
+"""
+
+import time
+from collections.abc import Callable
+
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Float, Int
+
+from envs.batch import BatchEnv
+from envs.hand.effects.mount_tilt import tilted
+from sysid.calibrate_search import Search
+from sysid.data import MeasuredLog
+from sysid.diagnosis import Diagnosis
+from sysid.walk_record import walk_record
+from sysid.walk_simulation import LOOKS, PIECE_STEPS, Pieces
+from sysid.walk_space import Hypothesis, axes, candidate, hypotheses
+from sysid.walk_verdict import BOUND, Judged, verdict_of
+
+STRETCH_S = 5.0
+FULL = 3
+"""Hypotheses that are fitted in full."""
+
+_PRIOR, _TANGENT, _ROBUST = 10.0, 0.5, 3.0
+
+
+class Walk:
+    """Residual of a walk as a function of all parameters."""
+
+    def __init__(self, log: MeasuredLog, env: BatchEnv):
+        self.axes = axes()
+        self.pieces = Pieces(env, walk_record(log, env))
+        record = self.pieces.record
+        rows = self.pieces.starts[:, None] + np.arange(PIECE_STEPS)
+        self._spin = np.mean((record.gyro - record.turning)[rows], 1)
+        self._down = np.mean(_turned(record.qpos[:, 3:7], record.gravity)[rows], 1)
+        self.block = (self.pieces.starts * record.dt // STRETCH_S).astype(int)
+        self.scale = np.ones(self.width)
+        self.scale = np.maximum(_scatter(self.raw(np.zeros(len(self.axes)))), 1e-6)
+
+    @property
+    def width(self) -> int:
+        """Residuals of one piece."""
+        return len(LOOKS) * 26 + 5
+
+    def raw(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w"]:
+        """Residuals in their own units."""
+        missed = self.pieces.misses(candidate(theta, self.axes))
+        values = {
+            (a.effect, a.name): a.value(float(x))
+            for a, x in zip(self.axes, theta, strict=True)
+        }
+        bias = [values["imu_bias", f"{a}_rad_s"] for a in "xyz"]
+        tilt = [values["floor_tilt", f"{a}_rad"] for a in ("roll", "pitch")]
+        down = np.asarray(tilted(jnp.array([0.0, 0.0, -1.0]), *tilt))
+        told = [self._spin - bias, (self._down - down)[:, :2]]
+        return np.concatenate([missed.reshape(len(missed), -1), *told], 1)
+
+    def residual(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w"]:
+        """Residuals over their scatter; large ones grow slowly."""
+        return _ROBUST * np.arcsinh(self.raw(theta) / self.scale / _ROBUST)
+
+    def tangent(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w a"]:
+        """Its derivative by all parameters."""
+        step = _TANGENT * np.eye(len(theta))
+        return np.stack(
+            [
+                (self.residual(theta + s) - self.residual(theta - s)) / (2 * _TANGENT)
+                for s in step
+            ],
+            -1,
+        )
+
+
+def diagnose_walk(
+    log: MeasuredLog,
+    env: BatchEnv,
+    tell: Callable[[str], object] = lambda text: None,
+) -> tuple[Diagnosis, list[Judged]]:
+    """Compares a walk with the simulation and names the cause of the difference.
+
+    Args:
+        log: of a free hand; see `sysid.walk_record.walk_record`.
+        env: worlds of a task with the hand of `sysid.walk_space.whole_hand`.
+        tell: hears what is being done.
+
+    Returns:
+        The verdict, and the hypotheses that were fitted in full, best first.
+
+    Raises:
+        InputError: a log that cannot be used, in one sentence.
+    """
+    began = time.monotonic()
+    tell("simulating the hand as it is")
+    walk = Walk(log, env)
+    zero = np.zeros(len(walk.axes))
+    base, tangent = walk.residual(zero), walk.tangent(zero)
+    ranked = sorted(
+        hypotheses(walk.axes),
+        key=lambda h: -np.sum(_linear_gains(walk, base, tangent, h)),
+    )
+    null = Hypothesis("", "", ())
+    plain = _judged(walk, null, np.zeros(int(walk.block.max()) + 1))
+    full = []
+    for hypothesis in ranked[:FULL]:
+        tell(f"fitting {hypothesis.effect} of {hypothesis.where}")
+        full.append(_judged(walk, hypothesis, plain.gains))
+    full.sort(key=lambda judged: -judged.gain)
+    count = walk.width * np.bincount(walk.block)
+    found = verdict_of(walk.axes, full, plain, count)
+    seconds = round(time.monotonic() - began, 3)
+    return Diagnosis(**found, log_sha256=(log.sha256,), seed=0, runtime_s=seconds), full
+
+
+def _linear_gains(walk: Walk, base, tangent, hypothesis: Hypothesis) -> np.ndarray:
+    """Held-out gains by stretch of a fit along the tangent."""
+    gains = np.zeros(int(walk.block.max()) + 1)
+    for side in (0, 1):
+        fit = walk.block % 2 == side
+        costs = []
+        for free in ((0,), (0, *hypothesis.indices)):
+            jac = tangent[..., list(free)]
+            a = jac[fit].reshape(-1, len(free))
+            gram = a.T @ a + np.eye(len(free)) / _PRIOR**2
+            step = -np.linalg.solve(gram, a.T @ base[fit].ravel())
+            costs.append(_costs(base + jac @ step, walk.block))
+        held = np.arange(len(gains)) % 2 != side
+        gains[held] = 0.5 * (costs[0] - costs[1])[held]
+    return gains
+
+
+def _judged(walk: Walk, hypothesis: Hypothesis, plain: np.ndarray) -> Judged:
+    """Fits in full; without a hypothesis the gains are minus the plain costs."""
+    free = np.array([0, *hypothesis.indices])
+    gains = np.zeros(int(walk.block.max()) + 1)
+    start = np.zeros(len(walk.axes))
+    whole = _fitted(walk, free, np.ones(len(walk.block), bool), start)
+    for side in (0, 1):
+        fit = walk.block % 2 == side
+        theta = _fitted(walk, free, fit, whole)
+        costs = _costs(walk.residual(theta), walk.block)
+        held = np.arange(len(gains)) % 2 != side
+        gains[held] = -0.5 * costs[held]
+    search = _search(walk, free, np.ones(len(walk.block), bool))
+    blocks = np.repeat(walk.block, walk.width)
+    spread, wide = search.spread(whole[free], blocks)
+    half = np.zeros(len(whole))
+    half[free] = wide * spread
+    return Judged(hypothesis, gains - plain, whole, half)
+
+
+def _fitted(walk: Walk, free, chosen, start) -> Float[np.ndarray, " a"]:
+    theta = start.copy()
+    theta[free] = _search(walk, free, chosen).solved(start[free])
+    return theta
+
+
+def _search(walk: Walk, free, chosen) -> Search:
+    """Least squares over some parameters and some pieces."""
+
+    def residuals(thetas: np.ndarray) -> np.ndarray:
+        found = []
+        for values in thetas:
+            theta = np.zeros(len(walk.axes))
+            theta[free] = values
+            found.append(walk.residual(theta)[chosen].ravel())
+        return np.stack(found)
+
+    wide = np.full(len(free), BOUND)
+    prior = np.full(len(free), _PRIOR)
+    return Search(
+        residuals, np.zeros(len(free)), prior, -wide, wide, _TANGENT, 6, 2.0, 4.0
+    )
+
+
+def _costs(residual: np.ndarray, block: Int[np.ndarray, " p"]) -> np.ndarray:
+    """Sum of squares by stretch."""
+    return np.bincount(block, np.sum(residual**2, axis=1))
+
+
+def _scatter(raw: np.ndarray) -> np.ndarray:
+    """Robust deviation of every channel around its median."""
+    return 1.4826 * np.median(np.abs(raw - np.median(raw, axis=0)), axis=0)
+
+
+def _turned(quat: np.ndarray, vector: np.ndarray) -> np.ndarray:
+    """Vectors of the palm frame in the world."""
+    w, u = quat[:, :1], quat[:, 1:]
+    twice = 2.0 * np.cross(u, vector)
+    return vector + w * twice + np.cross(u, twice)
