@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from fingers_deploy.runtime.launcher import LAST_S
+
 UNITS = Path(__file__).parents[1] / "systemd"
 
 
@@ -34,6 +36,8 @@ def test_it_is_watched_de_energizes_at_its_end_and_starts_by_hand_only():
     assert service["Service"]["Restart"] == "no"
     assert "guard" in service["Service"]["ExecStopPost"]
     assert "--arm" not in service["Service"]["ExecStart"]
+    assert service["Service"]["KillMode"] == "mixed"
+    assert float(service["Service"]["TimeoutStopSec"]) > LAST_S
     assert "Install" not in service and "Install" not in unit("fingers-deploy.socket")
 
 
@@ -117,6 +121,21 @@ def test_a_run_typed_at_through_a_pipe_has_nothing_open_on_a_network(service):
     assert network_sockets(process.pid) == []
     os.write(pipe, b"quit\n")
     wait_for(process, "de-energized, confirmed")
+    assert process.wait() in (0, 5)
+
+
+def test_a_request_to_end_that_reaches_every_process_settles_the_hand(service):
+    """As a service manager sends it, at the end of a run or of the computer."""
+    pipe, process = service
+    wait_for(process, "type: arm")
+    refused = True
+    while refused:
+        os.write(pipe, b"arm\n")
+        refused = "disabled -> arming" not in process.stdout.readline()
+    wait_for(process, "arming -> active")
+    os.killpg(process.pid, signal.SIGTERM)
+    wait_for(process, "OP operator stop: asked for -> settle")
+    wait_for(process, "de-energized, confirmed by the hand")
     assert process.wait() in (0, 5)
 
 

@@ -172,6 +172,7 @@ class SimulatorProcess:
             f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
             f"--seed={seed}",
             f"--lifetime-s={lifetime_s}",
+            f"--parent={os.getpid()}",
         ]
         if lockstep:
             arguments.append("--lockstep")

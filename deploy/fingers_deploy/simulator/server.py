@@ -6,6 +6,7 @@ lockstep it only advances when asked.
 """
 
 import argparse
+import os
 import socket
 import sys
 import time
@@ -15,6 +16,7 @@ import numpy as np
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.runtime.realtime import PRIORITY, prefer_this_process
+from fingers_deploy.runtime.signals import ignore_interrupts
 from fingers_deploy.simulator.hand import SimulatedHand
 from fingers_deploy.simulator.packets import REQUEST, Ask
 
@@ -43,13 +45,18 @@ class Server:
             if self._take(packet):
                 client.send(self._hand.state().tobytes())
 
-    def run_realtime(self, lifetime_s: float) -> None:
-        """Lives for some time, one driver after the other."""
+    def run_realtime(self, lifetime_s: float, parent: int = 0) -> None:
+        """Lives for some time, one driver after the other.
+
+        Args:
+            lifetime_s: how long [s].
+            parent: process whose child this is; it ends with it. 0: it stays.
+        """
         self._listener.setblocking(False)
         begin = time.monotonic()
         offset = begin - float(self._hand.data.time)
         deadline = begin
-        while deadline - begin < lifetime_s:
+        while deadline - begin < lifetime_s and parent in (0, os.getppid()):
             self._serve_one_state(offset)
             deadline += STATE_S
             late = time.monotonic() - deadline
@@ -137,7 +144,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--lockstep", action="store_true")
     parser.add_argument("--lifetime-s", type=float, default=86400.0)
+    parser.add_argument("--parent", type=int, default=0)
     options = parser.parse_args(arguments)
+    if options.parent:
+        ignore_interrupts()  # whoever started this also ends it, after the hand stood
     try:
         hand = SimulatedHand(
             options.model,
@@ -159,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         else:
             # A real hand does not wait for this computer either.
             prefer_this_process(PRIORITY + 10)
-            server.run_realtime(options.lifetime_s)
+            server.run_realtime(options.lifetime_s, options.parent)
     return 0
 
 

@@ -1,4 +1,8 @@
 import re
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -47,6 +51,33 @@ def test_in_real_time_it_holds_the_last_target_until_a_guard_comes(
         second = SimDriver(process.path, interface)
         assert make_safe(second)
         second.close()
+
+
+_STARTER = """
+import os, sys
+from fingers_deploy import load_bundle
+from fingers_deploy.drivers.sim import SimulatorProcess
+interface = load_bundle(sys.argv[2]).manifest.interface
+print(SimulatorProcess(sys.argv[1], interface).process.pid, flush=True)
+os._exit(1)  # as when it is killed
+"""
+
+
+def test_a_simulator_ends_with_whoever_started_it(hand_model, marching_dir):
+    program = [sys.executable, "-c", _STARTER, str(hand_model), str(marching_dir)]
+    done = subprocess.run(program, stdout=subprocess.PIPE, check=False)
+    running = Path(f"/proc/{int(done.stdout)}/stat")
+
+    def ended():
+        try:
+            return running.read_text().rpartition(")")[2].split()[0] == "Z"
+        except OSError:
+            return True
+
+    deadline = time.monotonic() + 20
+    while not ended() and time.monotonic() < deadline:
+        time.sleep(0.02)
+    assert ended()
 
 
 def test_a_simulator_that_goes_away_is_an_error(hand_model, interface):

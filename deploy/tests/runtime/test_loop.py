@@ -228,11 +228,12 @@ def test_what_was_obtained_is_reported(case):
         assert said == "SCHED_FIFO 50" if obtained else "no real-time" in said
 
 
-def test_an_interrupt_does_not_reach_the_hand_first():
+@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+def test_an_interrupt_does_not_reach_the_hand_first(number):
     program = (
         "import os, signal;"
         "from fingers_deploy.runtime.signals import ignore_interrupts;"
-        "ignore_interrupts(); os.kill(os.getpid(), signal.SIGINT); print('alive')"
+        f"ignore_interrupts(); os.kill(os.getpid(), signal.{number}); print('alive')"
     )
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True
