@@ -81,7 +81,8 @@ ROWS = (
         "S4",
         "bad target",
         "policy output not finite, step larger than alpha, or outside the trained "
-        "limits by more than 0.02 rad",
+        "limits by more than 0.02 rad (and targets pass once per control step, with "
+        "the answer that renews the lease)",
         0.020,
         HOLD,
         DISABLE,
@@ -132,8 +133,9 @@ ROWS = (
     Row(
         "S10",
         "command lost",
-        "newest frame of the command source older than 1 s (the command has ramped to "
-        "zero after 250 ms)",
+        "newest frame of the gamepad or, for a policy that reads it, sample of the "
+        "camera older than 1 s (from 250 ms on the command goes to zero), or the "
+        "keyboard that is pressed unplugged",
         1.060,
         SETTLE,
     ),
