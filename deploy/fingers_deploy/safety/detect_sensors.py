@@ -2,12 +2,13 @@
 
 import dataclasses
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.reading import ImuReading, Reading
+from fingers_deploy.safety.detect_fingers import FingerMemory, detect_fingers
 from fingers_deploy.safety.limits import Limits
 from fingers_deploy.safety.types import Inputs, PolicyFault
 
@@ -31,6 +32,7 @@ class SensorMemory:
         gyro_b: angular velocity then.
         imu_since_s: time of that change [s].
         frozen: the joints were found frozen and have not changed since.
+        fingers: the same, finger by finger.
     """
 
     pos_rad: Array | None = None
@@ -40,6 +42,7 @@ class SensorMemory:
     gyro_b: Array | None = None
     imu_since_s: float = 0.0
     frozen: bool = False
+    fingers: FingerMemory = field(default_factory=FingerMemory)
 
 
 def detect_sensors(
@@ -60,6 +63,17 @@ def detect_sensors(
     found: Found = {}
     memory = _remember(memory, inputs, target_rad, t)
     _late(inputs, t, limits, found)
+    reading = inputs.reading
+    fingers, words = detect_fingers(
+        memory.fingers,
+        None if reading is None else reading.pos_rad,
+        target_rad,
+        t,
+        limits,
+    )
+    if words:
+        found["S2"] = words
+    memory = dataclasses.replace(memory, fingers=fingers)
     memory = _frozen_joints(memory, target_rad, t, limits, found)
     _frozen_imu(memory, t, limits, found)
     _impossible(inputs, found)
@@ -98,7 +112,9 @@ def _remember(
         quat is None or (imu.quat_w != quat).any() or (imu.gyro_b != gyro).any()
     ):
         quat, gyro, imu_since = imu.quat_w, imu.gyro_b, t
-    return SensorMemory(pos, pos_since, target, quat, gyro, imu_since, frozen)
+    return SensorMemory(
+        pos, pos_since, target, quat, gyro, imu_since, frozen, memory.fingers
+    )
 
 
 def _late(inputs: Inputs, t: float, limits: Limits, found: Found) -> None:

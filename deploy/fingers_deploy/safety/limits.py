@@ -44,7 +44,8 @@ class Limits:
         tilt_s: how long the tilt must last [s].
         obs_age_s: oldest sample that counts as fresh [s].
         frozen_joints_s: joints bit-identical for so long, while the targets move by
-            `frozen_target_rad`, count as frozen [s].
+            `frozen_target_rad`, count as frozen [s]; those of one finger, while its
+            own targets move by `frozen_finger_rad`.
         frozen_imu_s: the same for the IMU, whatever the targets do [s].
         health_age_s: oldest slow read-back that counts as alive [s].
         effort_limit_a: effort limit that must be set [A].
@@ -79,6 +80,7 @@ class Limits:
     obs_age_s: float = 0.040
     frozen_joints_s: float = 0.100
     frozen_target_rad: float = 0.02
+    frozen_finger_rad: float = 0.1
     frozen_imu_s: float = 0.060
     health_age_s: float = 0.380
     effort_limit_a: float = 1.0

@@ -52,8 +52,8 @@ ROWS = (
     Row(
         "S2",
         "frozen sensor",
-        "20 joints bit-identical for 100 ms while a target moves by 0.02 rad; "
-        "IMU bit-identical for 60 ms",
+        "20 joints bit-identical for 100 ms while a target moves by 0.02 rad; those of "
+        "one finger while its own targets move by 0.1 rad; IMU bit-identical for 60 ms",
         0.150,
         HOLD,
         DISABLE,

@@ -25,6 +25,19 @@ def _late(inputs, t0, t):
     )
 
 
+def _finger_frozen(finger):
+    kept = []
+
+    def fault(inputs, t0, t):
+        r, joints = inputs.reading, slice(4 * finger, 4 * finger + 4)
+        kept.append(r.pos_rad[joints]) if not kept else None
+        return replace(
+            inputs, reading=replace(r, pos_rad=_set(r.pos_rad, joints, kept[0]))
+        )
+
+    return fault
+
+
 class _Frozen:
     def __init__(self, part):
         self.part, self.kept = part, None
@@ -222,6 +235,32 @@ def test_a_joint_that_does_not_follow_trips(make_rig):
     reaction_s = _inject(rig, _reading(pos_rad=blocked))
     assert reaction_s >= rig.limits.tracking_s
     assert "S8b" in {f.id for f in rig.state.faults}
+
+
+@pytest.mark.parametrize("finger", range(5))
+def test_one_finger_that_freezes_while_it_moves_is_found(rig, finger):
+    """In time after its targets have moved by 0.1 rad, and it stays found."""
+    reaction_s = _inject(rig, _finger_frozen(finger))
+    assert {f.id for f in rig.state.faults} == {"S2"}
+    assert f"finger {finger + 1} frozen" in rig.state.faults[0].detail
+    assert reaction_s <= 0.5
+    rig.run(0.5)
+    assert rig.state.mode == Mode.SAFE
+
+
+def test_one_finger_that_rests_is_no_fault(rig):
+    held, frozen = rig.state.target_rad.copy(), _finger_frozen(2)
+
+    def fault(inputs, t):
+        inputs, p = frozen(inputs, 0, t), inputs.proposal
+        if p is None:
+            return inputs
+        target = _set(p.target_rad, slice(8, 12), held[8:12])
+        return replace(inputs, proposal=replace(p, target_rad=target))
+
+    rig.fault = fault
+    rig.run(1.0)
+    assert rig.state.mode == Mode.ACTIVE and rig.state.faults == ()
 
 
 def test_frozen_joints_while_nothing_moves_are_no_fault(rig):
