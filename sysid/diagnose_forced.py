@@ -231,7 +231,7 @@ def forced_residuals(
             model(now), states, target, q, qd, load, kp, kd, dt, around
         )
         inertia = mass * now["inertia"] + x.inertia
-        loud, usual = _loudness(track, now, x, gain, inertia)
+        loud, usual = _loudness(track, now, x, gain, inertia / steep)
         own = jnp.minimum(rotor, 0.9 * inertia)
         # What encoders make of angles is as steep for speeds and accelerations.
         moves = jnp.abs(qd) > 1e-6

@@ -18,14 +18,11 @@ from sysid.diagnose_starts import starts_of
 MOST = 3
 """Largest number of causes."""
 
-REFINED = 4
+REFINED = 3
 """Number of candidates whose fits are continued."""
 
 LEAST_SHARE = 0.03
-"""Least share of the held-out error that a cause must remove."""
-
-OUT_OF_TOLERANCE = 16.0
-"""Squared deviations at which a figure counts as out of its tolerance: four sigma."""
+"""Least share of the held-out error above noise that a cause must remove."""
 
 ALIKE = 0.003
 """Share of a gain that does not decide between two effects."""
@@ -88,15 +85,15 @@ def _searched(problem: Problem, base: Model) -> Search:
         if not stage:
             break
         winner = stage[0]
-        if not _worth(problem, best, winner, samples):
+        if not _worth(problem, best, winner, base):
             break
         again = fit_models(problem, [best.effects], [winner.fit.theta])[0]
         if again.fit.cost < best.fit.cost:
-            base = again if not best.effects else base
-            if not _worth(problem, again, winner, samples):
-                best = again
+            if not _worth(problem, again, winner, base):
                 break
-        best = _pruned(problem, winner, samples)
+            if again.score < best.score:
+                base = again if not best.effects else base
+        best = _pruned(problem, winner, base)
         if best.effects != winner.effects:
             break
         if len(best.effects) == 1:
@@ -107,15 +104,15 @@ def _searched(problem: Problem, base: Model) -> Search:
     return Search(problem, base, best, rivals, without, samples)
 
 
-def _worth(problem: Problem, smaller: Model, larger: Model, samples: int) -> bool:
+def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
     """Tells whether a larger model is worth its effect."""
+    samples = int(problem.counts().sum())
     gain = gain_nat(smaller, larger, samples)
     added = [e for e in larger.effects if e not in smaller.effects]
     if all(problem.space.figured(e) for e in added):
         return gain > FIGURE_THRESHOLD
-    share = 1.0 - larger.score / smaller.score
-    told = smaller.penalty - larger.penalty > OUT_OF_TOLERANCE
-    return gain > THRESHOLD and (share > LEAST_SHARE or told)
+    removed, removable = smaller.score - larger.score, base.score - samples
+    return gain > THRESHOLD and removed > LEAST_SHARE * removable
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
@@ -154,7 +151,7 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     near = sorted(stage, key=lambda m: m.fit.cost)[:REFINED]
     near += [m for m in sorted(stage, key=order)[:REFINED] if m not in near]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
-    again = {m.effects: m for m in fit_models(problem, sets, starts, rounds=14)}
+    again = {m.effects: m for m in fit_models(problem, sets, starts, rounds=10)}
     return sorted((again.get(m.effects, m) for m in stage), key=order)
 
 
@@ -174,13 +171,13 @@ def _simplest_first(
     return [first, *(m for m in stage if m is not first)]
 
 
-def _pruned(problem: Problem, model: Model, samples: int) -> Model:
+def _pruned(problem: Problem, model: Model, base: Model) -> Model:
     """Drops effects that a larger model no longer needs."""
     while len(model.effects) > 1:
         sets = [tuple(e for e in model.effects if e != out) for out in model.effects]
         smaller = fit_models(problem, sets, [model.fit.theta] * len(sets))
         best = min(smaller, key=lambda m: m.score)
-        if _worth(problem, best, model, samples):
+        if _worth(problem, best, model, base):
             return model
         model = best
     return model
