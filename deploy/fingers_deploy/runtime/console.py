@@ -9,6 +9,7 @@ from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.safety.types import Operator
 
 _LONGEST = 65536
+_AT_ONCE = 64  # words that one step of the loop takes
 ACTIONS = {"arm": Operator.ARM, "stop": Operator.STOP, "clear": Operator.CLEAR}
 
 
@@ -32,11 +33,11 @@ class ConsoleLink:
         A console that is gone counts as an operator who wants to stop and quit.
         """
         action = Operator.NONE
-        while True:
+        for _ in range(_AT_ONCE):
             try:
                 data = self._socket.recv(_LONGEST)
             except BlockingIOError:
-                return action
+                break
             except OSError:
                 data = b""
             if not data:
@@ -52,6 +53,7 @@ class ConsoleLink:
             else:
                 asked = ACTIONS.get(word, action)
                 action = action if action == Operator.STOP else asked
+        return action
 
     def tell(self, status: dict[str, Any]) -> None:
         """Sends a status; one for which there is no room is lost."""

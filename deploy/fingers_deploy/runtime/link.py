@@ -11,6 +11,7 @@ from fingers_deploy.safety.types import PolicyFault, Proposal
 
 Array = NDArray[np.float64]
 COMMANDS = 9  # most task inputs of any task
+_AT_ONCE = 16  # answers that one step of the loop takes
 
 OBSERVATION = np.dtype(
     [
@@ -88,9 +89,12 @@ class SupervisorEnd:
             self.open = False
 
     def poll(self) -> Answer | None:
-        """Returns the newest answer since the last call."""
+        """Returns the newest answer since the last call.
+
+        A policy that floods the link is read bit by bit: it may not hold up the loop.
+        """
         newest = None
-        while True:
+        for _ in range(_AT_ONCE):
             try:
                 data = self._socket.recv(ANSWER.itemsize)
             except BlockingIOError:

@@ -129,6 +129,17 @@ def test_a_link_that_nobody_reads_blocks_nothing():
     assert not end.open
 
 
+def test_a_policy_that_floods_the_link_does_not_hold_up_the_loop():
+    left, right = make_link()
+    end = SupervisorEnd(left)
+    for tick in range(100):
+        right.send(encode_answer(Proposal(tick, 0, np.zeros(20)), np.zeros(0), 0))
+    ticks = []
+    while (answer := end.poll()) is not None:
+        ticks.append(answer.proposal.tick)
+    assert ticks[0] == 15 and ticks[-1] == 99 and len(ticks) == 7
+
+
 def test_half_an_answer_and_noise_are_no_proposal():
     left, right = make_link()
     end, rng = SupervisorEnd(left), np.random.default_rng(0)
