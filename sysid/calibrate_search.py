@@ -17,8 +17,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.stats import t as student
 
-_TRIED = np.array([0.1, 1.0, 30.0, 1e3])
-
 Residual = Callable[[Float[np.ndarray, "c n"]], Float[np.ndarray, "c r"]]
 """Parameters of candidates -> their weighted residuals."""
 
@@ -35,6 +33,9 @@ class Search:
         rounds: steps at most.
         enough: gain of a step below which the search ends.
         reach: largest change of a parameter in one step.
+        tried: dampings that are tried, as multiples of the last one that helped.
+        stretched: factors on steps that are tried too: differences of a chaotic
+            simulation are noisy, which makes steps too short.
     """
 
     residuals: Residual
@@ -46,6 +47,8 @@ class Search:
     rounds: int = 30
     enough: float = 0.02
     reach: float = 1.0
+    tried: tuple[float, ...] = (0.1, 1.0, 30.0, 1e3)
+    stretched: tuple[float, ...] = (1.0,)
 
     def cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
         """Value that is minimized."""
@@ -70,9 +73,12 @@ class Search:
             r, jac = self.linear(theta)
             gram = jac.T @ jac + np.diag(self.deviation**-2.0)
             slope = jac.T @ r + (theta - self.center) / self.deviation**2
-            tries, free = damping * _TRIED, self._free(theta, slope)
+            tries = damping * np.repeat(self.tried, len(self.stretched))
+            free = self._free(theta, slope)
             steps = [
-                _step(gram + d * np.diag(np.diag(gram)), slope, free) for d in tries
+                stretch * _step(gram + d * np.diag(np.diag(gram)), slope, free)
+                for d in damping * np.array(self.tried)
+                for stretch in self.stretched
             ]
             thetas = np.clip(
                 theta + np.clip(steps, -self.reach, self.reach), self.low, self.high

@@ -32,7 +32,7 @@ STRETCH_S = 5.0
 FULL = 3
 """Hypotheses that are fitted in full."""
 
-_PRIOR, _TANGENT, _ROBUST = 10.0, 0.5, 3.0
+_PRIOR, _TANGENT, _ROBUST = 10.0, 1.0, 3.0
 
 
 class Walk:
@@ -111,11 +111,15 @@ def diagnose_walk(
         key=lambda h: -np.sum(_linear_gains(walk, base, tangent, h)),
     )
     null = Hypothesis("", "", ())
-    plain = _judged(walk, null, np.zeros(int(walk.block.max()) + 1))
+    none = np.zeros(int(walk.block.max()) + 1)
+    plain = _judged(walk, null, none, np.zeros(1))
     full = []
     for hypothesis in ranked[:FULL]:
         tell(f"fitting {hypothesis.effect} of {hypothesis.where}")
-        full.append(_judged(walk, hypothesis, plain.gains))
+        jac = tangent[..., [0, *hypothesis.indices]]
+        every = np.ones(len(walk.block), dtype=bool)
+        start = _step(base, jac, every, np.zeros(jac.shape[-1]))
+        full.append(_judged(walk, hypothesis, plain.gains, start))
     full.sort(key=lambda judged: -judged.gain)
     count = walk.width * np.bincount(walk.block)
     found = verdict_of(walk.axes, full, plain, count)
@@ -131,56 +135,66 @@ def _linear_gains(walk: Walk, base, tangent, hypothesis: Hypothesis) -> np.ndarr
         costs = []
         for free in ((0,), (0, *hypothesis.indices)):
             jac = tangent[..., list(free)]
-            a = jac[fit].reshape(-1, len(free))
-            gram = a.T @ a + np.eye(len(free)) / _PRIOR**2
-            step = -np.linalg.solve(gram, a.T @ base[fit].ravel())
+            step = _step(base, jac, fit, np.zeros(len(free)))
             costs.append(_costs(base + jac @ step, walk.block))
         held = np.arange(len(gains)) % 2 != side
         gains[held] = 0.5 * (costs[0] - costs[1])[held]
     return gains
 
 
-def _judged(walk: Walk, hypothesis: Hypothesis, plain: np.ndarray) -> Judged:
-    """Fits in full; without a hypothesis the gains are minus the plain costs."""
+def _judged(
+    walk: Walk, hypothesis: Hypothesis, plain: np.ndarray, start: np.ndarray
+) -> Judged:
+    """Fits in full; without a hypothesis the gains are minus the plain costs.
+
+    The fits of either half take the Jacobian of the fit of the whole, from which they
+    are not far.
+    """
     free = np.array([0, *hypothesis.indices])
+    search, theta = _search(walk, free), np.zeros(len(walk.axes))
+    theta[free] = search.solved(start)
+    r, jac = (x.reshape(len(walk.block), -1) for x in search.linear(theta[free]))
+    jac = jac.reshape(*r.shape, len(free))
     gains = np.zeros(int(walk.block.max()) + 1)
-    start = np.zeros(len(walk.axes))
-    whole = _fitted(walk, free, np.ones(len(walk.block), bool), start)
     for side in (0, 1):
-        fit = walk.block % 2 == side
-        theta = _fitted(walk, free, fit, whole)
-        costs = _costs(walk.residual(theta), walk.block)
+        half = theta.copy()
+        half[free] += _step(r, jac, walk.block % 2 == side, theta[free])
         held = np.arange(len(gains)) % 2 != side
-        gains[held] = -0.5 * costs[held]
-    search = _search(walk, free, np.ones(len(walk.block), bool))
-    blocks = np.repeat(walk.block, walk.width)
-    spread, wide = search.spread(whole[free], blocks)
-    half = np.zeros(len(whole))
+        gains[held] = -0.5 * _costs(walk.residual(half), walk.block)[held]
+    spread, wide = search.spread(theta[free], np.repeat(walk.block, walk.width))
+    half = np.zeros(len(theta))
     half[free] = wide * spread
-    return Judged(hypothesis, gains - plain, whole, half)
+    return Judged(hypothesis, gains - plain, theta, half)
 
 
-def _fitted(walk: Walk, free, chosen, start) -> Float[np.ndarray, " a"]:
-    theta = start.copy()
-    theta[free] = _search(walk, free, chosen).solved(start[free])
-    return theta
+def _step(r: np.ndarray, jac: np.ndarray, chosen: np.ndarray, at: np.ndarray):
+    """Step to the least squares of some pieces."""
+    a = jac[chosen].reshape(-1, jac.shape[-1])
+    gram = a.T @ a + np.eye(len(at)) / _PRIOR**2
+    return -np.linalg.solve(gram, a.T @ r[chosen].ravel() + at / _PRIOR**2)
 
 
-def _search(walk: Walk, free, chosen) -> Search:
-    """Least squares over some parameters and some pieces."""
+def _search(walk: Walk, free: Int[np.ndarray, " k"]) -> Search:
+    """Least squares over some parameters."""
 
     def residuals(thetas: np.ndarray) -> np.ndarray:
-        found = []
-        for values in thetas:
-            theta = np.zeros(len(walk.axes))
-            theta[free] = values
-            found.append(walk.residual(theta)[chosen].ravel())
-        return np.stack(found)
+        whole = np.zeros((len(thetas), len(walk.axes)))
+        whole[:, free] = thetas
+        return np.stack([walk.residual(theta).ravel() for theta in whole])
 
     wide = np.full(len(free), BOUND)
-    prior = np.full(len(free), _PRIOR)
     return Search(
-        residuals, np.zeros(len(free)), prior, -wide, wide, _TANGENT, 6, 2.0, 4.0
+        residuals,
+        center=np.zeros(len(free)),
+        deviation=np.full(len(free), _PRIOR),
+        low=-wide,
+        high=wide,
+        step=_TANGENT,
+        rounds=8,
+        enough=2.0,
+        reach=5.0,
+        tried=(0.1,),
+        stretched=(0.5, 1.0, 2.5, 6.0),
     )
 
 

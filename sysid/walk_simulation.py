@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import jax
 import numpy as np
 from jaxtyping import Float
 from mujoco import rollout
@@ -42,6 +43,9 @@ class Pieces:
         self.starts = np.arange(0, len(record.qpos) - PIECE_STEPS - 1, PIECE_STEPS)
         model = env.mj_model
         spec = mujoco.mjtState.mjSTATE_FULLPHYSICS
+        self._fields = jax.jit(
+            lambda params: replace(env.plant.effects, params=params).change({})
+        )
         self._data = mujoco.MjData(model)
         self._states = np.zeros((len(self.starts), mujoco.mj_stateSize(model, spec)))
         for row, start in zip(self._states, self.starts, strict=True):
@@ -64,9 +68,7 @@ class Pieces:
 
     def _model(self, candidate: Candidate):
         """The nominal model with the candidate's effects in it."""
-        effects = self.env.plant.effects
-        params = {k: v for k, v in candidate.items() if k in effects.params}
-        fields = replace(effects, params=params).change({})
+        fields = self._fields(candidate)
         model = copy.copy(self.env.mj_model)
         model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
         for name, value in fields.items():
