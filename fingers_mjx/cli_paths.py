@@ -41,5 +41,5 @@ def _check_place(option: str, path: Path, directory: Path) -> None:
         with tempfile.TemporaryFile(dir=directory):
             return
     except OSError as error:
-        found = f"{path} ({directory}: {error.strerror})"
+        found = f"{path} ({error.strerror}: {directory})"
         raise InputError(option, "", found, "a place to write to") from error

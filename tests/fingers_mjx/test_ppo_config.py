@@ -92,5 +92,6 @@ def test_only_what_does_not_touch_learning_is_free():
         "log_every",
         "checkpoint_every",
         "keep_checkpoints",
+        "on_overflow",
         "hang_limit_s",
     }
