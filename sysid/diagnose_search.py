@@ -27,10 +27,10 @@ LEAST_SHARE = 0.03
 ALIKE = 0.003
 """Share of a gain that does not decide between two effects."""
 
-THRESHOLD = 12.0
+THRESHOLD = 18.0
 """Least gain of a cause in the logarithm of the predictive density [nat]."""
 
-FIGURE_THRESHOLD = 6.0
+FIGURE_THRESHOLD = 7.0
 """The same of a figure that the simulation has and that leaves its tolerance [nat]."""
 
 
@@ -82,11 +82,10 @@ def _searched(problem: Problem, base: Model) -> Search:
     rivals: dict[str, list[Model]] = {}
     for _ in range(MOST):
         stage = extended(problem, best)
-        if not stage:
+        worth = [m for m in stage if _worth(problem, best, m, base)]
+        if not worth:
             break
-        winner = stage[0]
-        if not _worth(problem, best, winner, base):
-            break
+        winner = worth[0]
         again = fit_models(problem, [best.effects], [winner.fit.theta])[0]
         if again.fit.cost < best.fit.cost:
             if not _worth(problem, again, winner, base):
@@ -97,7 +96,7 @@ def _searched(problem: Problem, base: Model) -> Search:
         if best.effects != winner.effects:
             break
         if len(best.effects) == 1:
-            rivals[best.effects[0]] = stage[1:]
+            rivals[best.effects[0]] = [m for m in stage if m is not winner]
     without = {best.effects[0]: base} if best.effects else {}
     if len(best.effects) > 1:
         rivals, without = _swapped(problem, best)

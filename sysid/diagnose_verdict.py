@@ -9,7 +9,7 @@ from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
 from sysid.diagnose_model import Model, gain_nat
 from sysid.diagnose_problem import CHANNELS
-from sysid.diagnose_search import THRESHOLD, Search
+from sysid.diagnose_search import Search
 from sysid.diagnose_space import Slot
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
@@ -29,6 +29,9 @@ EXCESS = 1.5
 
 LEFT = 0.15
 """Share of the removable squared error that a whole explanation may leave."""
+
+SEEN = 12.0
+"""Gain from which on an effect counts as seen [nat]."""
 
 DARK = 0.6
 """Share of the effects that records must hide to tell nothing."""
@@ -252,7 +255,7 @@ def blind_effects(found: Search) -> list[str]:
     best = {name: 0.0 for name in names}
     for name, value in zip(owners, seen, strict=True):
         best[name] = max(best[name], float(value) / scale)
-    return [name for name in names if best[name] < 2.0 * THRESHOLD]
+    return [name for name in names if best[name] < 2.0 * SEEN]
 
 
 def _shapes(effect: str) -> set[str]:

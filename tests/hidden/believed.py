@@ -74,6 +74,9 @@ _TRANSLATED = {
         "compliance_rad_nm": 1.0 / v["stiffness_nm_rad"],
         "motor_inertia_kgm2": ROTOR_SHARE * true.armature,
     },
+    # Masing: after a reversal Jenkins elements need twice the way of a first loading,
+    # which Dahl's curve does not.
+    "hysteresis": lambda v, true, was: {**v, "range_rad": 2.0 * v["range_rad"]},
     "joint_coupling": lambda v, true, was: {"stiffness_nm_rad": -v["stiffness_nm_rad"]},
     "clock_drift": lambda v, true, was: {"drift_ppm": -1e6 * v["drift"]},
 }
