@@ -11,13 +11,13 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from envs.errors import InputError
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
 from envs.hand.stance import Stance
-from envs.hand.stance_search import TIP_RADIUS_M
 from envs.hand_env import HandEnv
 from envs.hand_settings import HandSettings
-from envs.keyboard_fingertip import fingertip_v
+from envs.keyboard_fingertip import TIP_RADIUS_M, fingertip_v
 from envs.keyboard_measures import press_measures
 from envs.keyboard_model import (
     ACTUATION_M,
@@ -359,6 +359,9 @@ class KeyboardEnv(HandEnv):
         stance: Stance | None = None,
     ):
         hand = hand or load_hand_file()
+        if hand.figures:
+            valid = "none: the task's fingertip is told by the vendor's figures"
+            raise InputError("hand file", "figures", "figures of a hand", valid)
         stance = stance or keyboard_stance(hand)
         task = Keyboard(config or KeyboardConfig(), stance)
         super().__init__(task, backend, num_worlds, hand, stance)

@@ -10,6 +10,7 @@ from envs.rotations import multiply, rotate, unrotate
 
 JOINTS = slice(4 * FINGER_INDEX, 4 * FINGER_INDEX + 4)
 """The finger's joints among the 20."""
+TIP_RADIUS_M = 0.0075
 
 
 def fingertip_v(

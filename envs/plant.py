@@ -27,7 +27,6 @@ from envs.hand.drive import (
     drive_params,
     init_drive_state,
 )
-from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.scene_effects import SceneEffects, make_scene_effects
@@ -200,7 +199,7 @@ def make_plant(
     """
     chain = make_chain(hand, PHYSICS_DT_S)
     physics = make(n_substeps if chain is None else 1)
-    kp, kv, limit = (figures().per_joint(k) for k in ("kp", "kv", "force_limit"))
+    kp, kv, limit = (hand.nominal.per_joint(k) for k in ("kp", "kv", "force_limit"))
     drive = drive_params(hand, kp, kv, limit)
     spec = hand_spec(physics.mj_model)
     return Plant(

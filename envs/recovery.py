@@ -7,12 +7,10 @@ from typing import Any
 import flax.struct
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Bool, Float, Int
 
 from envs.base import State
 from envs.commands import CommandConfig, sample_command
-from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.hand_env import HandEnv
@@ -37,9 +35,6 @@ from envs.scoring import check_weights
 from envs.signals import Signals
 from envs.streams import stream
 from rewards import RECOVERY, RewardTable
-
-PALM_MIDDLE_B = np.array(figures().palm.inertial_pos)
-"""Centre of mass of the palm in the palm frame, whose origin is at the wrist [m]."""
 
 
 def _no_command() -> CommandConfig:
@@ -96,6 +91,8 @@ class Recovery(BareTask):
         config: settings of the task.
         stance: the crawl stance that is to be reached.
         falls: poses that episodes start from.
+        palm_middle_b: centre of mass of the palm in the palm frame, whose origin is at
+            the wrist [m].
         practice: poses that some training episodes start from instead.
         table: rows of the reward; they may bind every signal and the magnitudes of
             `magnitudes`.
@@ -104,6 +101,7 @@ class Recovery(BareTask):
     config: RecoveryConfig
     stance: Stance
     falls: Falls
+    palm_middle_b: tuple[float, float, float]
     practice: Poses = ()
     table: RewardTable = RECOVERY
 
@@ -172,10 +170,11 @@ class Recovery(BareTask):
         """What the goals compare: gravity in V, height, and both of the stance."""
         del valid  # no memory of a reward
         up_b = unrotate(jnp.array(self.stance.root_quat_w), jnp.array([0.0, 0.0, 1.0]))
+        middle_b = jnp.array(self.palm_middle_b)
         return memory, {
             "gravity_v": self._gravity_v(signals),
-            "height_m": signals.palm_pos_w[2] - PALM_MIDDLE_B @ signals.gravity_b,
-            "stance_height_m": self.stance.root_pos_w[2] + jnp.dot(PALM_MIDDLE_B, up_b),
+            "height_m": signals.palm_pos_w[2] - middle_b @ signals.gravity_b,
+            "stance_height_m": self.stance.root_pos_w[2] + middle_b @ up_b,
             "stance_joint_pos": jnp.array(self.stance.joint_pos_rad),
         }
 
@@ -258,7 +257,8 @@ class RecoveryEnv(HandEnv):
         config, falls = config or RecoveryConfig(), falls_of(hand, stance)
         wanted = config.practice_fraction > 0.0 and not config.settle
         practice = practice_of(hand, stance) if wanted else ()
-        task = Recovery(config, stance, falls, practice)
+        middle_b = hand.nominal.palm.inertial_pos
+        task = Recovery(config, stance, falls, middle_b, practice)
         super().__init__(task, backend, num_worlds, hand, stance)
 
     def step(self, state: State, action: Float[Array, "20"]) -> State:

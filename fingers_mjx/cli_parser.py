@@ -6,12 +6,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
+from fingers_mjx.cli_parser_hand import add_hand
 from fingers_mjx.cli_parser_sysid import add_calibrate, add_diagnose, add_excite
 from fingers_mjx.cli_parser_transfer import add_transfer
 
 MAX_SEED = 2**32 - 1
-STANCE_STARTS = 40
-"""Starts with which the stored stance was found."""
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 
 
@@ -37,7 +36,7 @@ def make_parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
-    for add in (_train, _eval, _export, _play, _hand, _sysid, _demo):
+    for add in (_train, _eval, _export, _play, _add_hand, _sysid, _demo):
         add(commands)
     return parser
 
@@ -234,42 +233,9 @@ def _play(commands) -> None:
     _json(parser)
 
 
-def _hand(commands) -> None:
-    parser = _command(commands, "hand", "cli_hand", "look at the hand and its stance")
-    actions = parser.add_subparsers(metavar="ACTION", required=True, dest="action")
-    show = actions.add_parser(
-        "show",
-        help="draw the stance from four sides",
-        description="Draws the stance from four sides, with the control frame V, "
-        "fingertips, pad normals and support polygon.",
-    )
-    show.add_argument("--out", type=Path, metavar="DIR", default=Path("hand"))
-    stance = actions.add_parser(
-        "stance",
-        help="search the stance again",
-        description="Searches the stance, settles it for 4 s and prints it as JSON.",
-    )
-    _seed(stance)
-    stance.add_argument(
-        "--starts",
-        type=whole(1),
-        default=STANCE_STARTS,
-        help=f"random starts of the search (default {STANCE_STARTS})",
-    )
-    stance.add_argument("--out", type=Path, metavar="FILE", help="instead of stdout")
-    mjcf = actions.add_parser(
-        "mjcf",
-        help="write the hand as MJCF",
-        description="Writes the hand, standing, as one MJCF file: the model for "
-        "fingers-deploy run --driver sim, or to look at in any MuJoCo viewer.",
-    )
-    mjcf.add_argument(
-        "-o", "--out", type=Path, metavar="FILE", help="instead of stdout"
-    )
-    for action in (show, stance, mjcf):
-        action.add_argument(
-            "--hand", type=Path, metavar="FILE", help="default: the paper's hand"
-        )
+def _add_hand(commands) -> None:
+    summary = "look at the hand and its stance, or bring a hand of your own"
+    add_hand(_command(commands, "hand", "cli_hand", summary), _seed, whole)
 
 
 def _sysid(commands) -> None:

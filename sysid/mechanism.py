@@ -157,14 +157,14 @@ def hand_mechanism(hand: HandFile | None = None) -> Mechanism:
     model = spec.compile()
     drives = {
         link.joint: _hand_drive(hand, index)
-        for index, link in enumerate(figures().links)
+        for index, link in enumerate(hand.nominal.links)
     }
     return Mechanism(model, drives, _hand_classes(), hand)
 
 
 def _hand_drive(hand: HandFile, index: int) -> JointDrive:
     """Drive of one joint of the hand."""
-    link = figures().links[index]
+    link = hand.nominal.links[index]
     limit = link.force_limit * hand.torque_scale.per_joint()[index]
     return JointDrive(
         kp=Figure(link.kp * hand.stiffness_scale.per_joint()[index]),

@@ -1,18 +1,40 @@
-"""Figures of the WUJI right hand: kinematics, inertials, limits and nominal drive.
+"""Figures of a hand: kinematics, inertials, limits and nominal drive.
 
-The numbers are the vendor's (WUJI right hand description, release 2026.04.27, MIT
-licence) with collision bounds measured on its meshes; `figures.json` keeps them in
-metre, kilogram, radian and newton-metre.
+Those of the WUJI right hand are the vendor's (WUJI right hand description, release
+2026.04.27, MIT licence) with collision bounds measured on its meshes; `figures.json`
+keeps them in metre, kilogram, radian and newton-metre. A hand file may carry others.
 """
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import numpy as np
 
+from envs.config import from_dict
+from envs.errors import InputError
+
 FINGERS = ("thumb", "index", "middle", "ring", "little")
+NAMES = tuple(
+    (f"finger{f}_link{i}", f"finger{f}_joint{i}")
+    for f in range(1, 6)
+    for i in range(1, 5)
+)
+"""Names of the 20 links and their joints."""
+
+Vector = tuple[float, float, float]
+Quat = tuple[float, float, float, float]
+Capsule = tuple[Vector, Vector, float]
+
+
+def _limits(unit: str, low: float, high: float) -> dict[str, Any]:
+    return {"unit": unit, "low": low, "high": high}
+
+
+_PLACE, _TURN = _limits("m", -0.5, 0.5), _limits("1", -1.01, 1.01)
+_MASS, _INERTIA = _limits("kg", 1e-6, 5.0), _limits("kg·m²", 1e-13, 1.0)
 
 
 @dataclass(frozen=True)
@@ -28,45 +50,93 @@ class Link:
         kp, kv: nominal (uncalibrated) position-drive gains [N·m/rad, N·m·s/rad].
         force_limit: nominal drive torque limit [N·m].
         capsule: (from, to, radius) of the collision capsule, or None.
-        tip: centre of the fingertip sphere [m] on distal links, else None.
+        tip: centre of the fingertip sphere [m] on distal links, else None; the end of
+            the capsule.
     """
 
     body: str
     joint: str
-    pos: tuple[float, ...]
-    quat: tuple[float, ...]
-    range_rad: tuple[float, float]
-    armature: float
-    mass: float
-    inertial_pos: tuple[float, ...]
-    inertial_quat: tuple[float, ...]
-    diaginertia: tuple[float, ...]
-    kp: float
-    kv: float
-    force_limit: float
-    capsule: tuple[tuple[float, ...], tuple[float, ...], float] | None
-    tip: tuple[float, ...] | None
+    pos: Vector = field(metadata=_PLACE)
+    quat: Quat = field(metadata=_TURN)
+    range_rad: tuple[float, float] = field(metadata=_limits("rad", -6.3, 6.3))
+    armature: float = field(metadata=_limits("kg·m²", 0.0, 1.0))
+    mass: float = field(metadata=_MASS)
+    inertial_pos: Vector = field(metadata=_PLACE)
+    inertial_quat: Quat = field(metadata=_TURN)
+    diaginertia: Vector = field(metadata=_INERTIA)
+    kp: float = field(metadata=_limits("N·m/rad", 1e-6, 1e4))
+    kv: float = field(metadata=_limits("N·m·s/rad", 0.0, 1e4))
+    force_limit: float = field(metadata=_limits("N·m", 1e-6, 1e3))
+    capsule: Capsule | None = field(default=None, metadata=_PLACE)
+    tip: Vector | None = field(default=None, metadata=_PLACE)
+
+    def __post_init__(self) -> None:
+        _check_unit("quat", self.quat)
+        _check_inertia(self)
+        low, high = self.range_rad
+        if not low < high:
+            raise InputError("figures", "range_rad", self.range_rad, "low below high")
+        if self.capsule:
+            start, end, radius = self.capsule
+            if radius < 1e-4 or np.linalg.norm(np.subtract(end, start)) < 1e-4:
+                valid = "two ends and a radius, 0.1 mm or more apart and thick"
+                raise InputError("figures", "capsule", self.capsule, valid)
 
 
 @dataclass(frozen=True)
 class Palm:
     """The palm: inertial figures and the bounds of its mesh [kg, m, kg·m²]."""
 
-    mass: float
-    inertial_pos: tuple[float, ...]
-    inertial_quat: tuple[float, ...]
-    diaginertia: tuple[float, ...]
-    bounds_min: tuple[float, ...]
-    bounds_max: tuple[float, ...]
+    mass: float = field(metadata=_MASS)
+    inertial_pos: Vector = field(metadata=_PLACE)
+    inertial_quat: Quat = field(metadata=_TURN)
+    diaginertia: Vector = field(metadata=_INERTIA)
+    bounds_min: Vector = field(metadata=_PLACE)
+    bounds_max: Vector = field(metadata=_PLACE)
+
+    def __post_init__(self) -> None:
+        _check_inertia(self)
+        if not np.all(np.subtract(self.bounds_max, self.bounds_min) > 1e-4):
+            valid = f"each above that of bounds_min, {list(self.bounds_min)}"
+            raise InputError("figures", "bounds_max", list(self.bounds_max), valid)
+
+
+def _check_unit(name: str, quat: Quat) -> None:
+    if abs(np.linalg.norm(quat) - 1.0) > 1e-3:
+        valid = "w x y z of length 1"
+        raise InputError("figures", name, list(quat), valid)
+
+
+def _check_inertia(part: Link | Palm) -> None:
+    """Refuses principal moments that no body has."""
+    _check_unit("inertial_quat", part.inertial_quat)
+    if 2.0 * max(part.diaginertia) > (1.0 + 1e-9) * sum(part.diaginertia):
+        valid = "moments of which none is more than the other two together"
+        raise InputError("figures", "diaginertia", list(part.diaginertia), valid)
 
 
 @dataclass(frozen=True)
 class Figures:
-    """The whole hand; `links` is finger-major, proximal to distal (5 × 4)."""
+    """The whole hand; `links` is finger-major, proximal to distal (5 × 4).
+
+    The first link of a finger has no capsule, only the last one a tip.
+    """
 
     palm: Palm
     links: tuple[Link, ...]
-    kinematics_checks: tuple[tuple[np.ndarray, np.ndarray], ...]
+
+    def __post_init__(self) -> None:
+        found = tuple((link.body, link.joint) for link in self.links)
+        if found != NAMES:
+            wrong = next((f for f, n in zip(found, NAMES, strict=False) if f != n), "")
+            told = " ".join(wrong) or f"{len(found)} links"
+            valid = "20 links finger1_link1 to finger5_link4 with such joints, in order"
+            raise InputError("figures", "links", told, valid)
+        for index, link in enumerate(self.links):
+            shape = (link.capsule is not None, link.tip is not None)
+            if shape != (index % 4 > 0, index % 4 == 3):
+                valid = "a capsule on links 2 to 4 of a finger, a tip on link 4 alone"
+                raise InputError("figures", f"links.{index}", link.body, valid)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
@@ -80,44 +150,42 @@ class Figures:
 
 def _link(raw: dict) -> Link:
     capsule = raw.get("collision", {}).get("capsule")
-    ends = capsule and tuple(map(float, capsule["fromto"]))
-    return Link(
-        body=raw["body"],
-        joint=raw["joint"],
-        armature=raw["armature"],
-        mass=raw["mass"],
-        pos=tuple(raw["pos"]),
-        quat=tuple(raw["quat"]),
-        inertial_pos=tuple(raw["inertial_pos"]),
-        inertial_quat=tuple(raw["inertial_quat"]),
-        diaginertia=tuple(raw["diaginertia"]),
-        range_rad=tuple(raw["range"]),
-        kp=raw["drive"]["kp"],
-        kv=raw["drive"]["kv"],
-        force_limit=raw["drive"]["force_limit"],
-        capsule=(ends[:3], ends[3:], capsule["radius"]) if capsule else None,
-        tip=tuple(raw["fingertip"]["pos"]) if "fingertip" in raw else None,
-    )
+    same = ("body", "joint", "pos", "quat", "armature", "mass")
+    inertial = ("inertial_pos", "inertial_quat", "diaginertia")
+    data = {name: raw[name] for name in (*same, *inertial)} | raw["drive"]
+    del data["ctrlrange"]
+    data["range_rad"] = raw["range"]
+    if capsule:
+        ends = capsule["fromto"]
+        data["capsule"] = [ends[:3], ends[3:], capsule["radius"]]
+    if "fingertip" in raw:
+        data["tip"] = raw["fingertip"]["pos"]
+    return from_dict(Link, data, "figures.json", raw["body"])
 
 
 def _palm(raw: dict) -> Palm:
-    return Palm(
-        mass=raw["mass"],
-        **{k: tuple(raw[k]) for k in ("inertial_pos", "inertial_quat", "diaginertia")},
-        bounds_min=tuple(raw["mesh_bounds"]["min"]),
-        bounds_max=tuple(raw["mesh_bounds"]["max"]),
-    )
+    bounds = {f"bounds_{end}": raw["mesh_bounds"][end] for end in ("min", "max")}
+    rest = {name: value for name, value in raw.items() if name != "mesh_bounds"}
+    return from_dict(Palm, rest | bounds, "figures.json", "palm")
+
+
+@cache
+def _raw() -> dict:
+    return json.loads(files("envs.hand").joinpath("figures.json").read_text("utf-8"))
 
 
 @cache
 def figures() -> Figures:
-    """Reads `figures.json` beside this file."""
-    raw = json.loads(files("envs.hand").joinpath("figures.json").read_text("utf-8"))
+    """Reads the vendor's hand from `figures.json` beside this file."""
     return Figures(
-        palm=_palm(raw["palm"]),
-        links=tuple(_link(link) for f in raw["fingers"] for link in f["links"]),
-        kinematics_checks=tuple(
-            (np.array(c["qpos"]), np.array(c["fingertip_in_palm"]))
-            for c in raw["forward_kinematics_checks"]
-        ),
+        palm=_palm(_raw()["palm"]),
+        links=tuple(_link(link) for f in _raw()["fingers"] for link in f["links"]),
+    )
+
+
+def kinematics_checks() -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    """The vendor's check poses: angles [rad] (20), tips in the palm [m] (5 × 3)."""
+    return tuple(
+        (np.array(c["qpos"]), np.array(c["fingertip_in_palm"]))
+        for c in _raw()["forward_kinematics_checks"]
     )

@@ -21,7 +21,7 @@ from jaxtyping import Float
 from envs.config import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError, one_of
 from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.figures import figures
+from envs.hand.figures import Figures, figures
 from envs.hand.places import fingers_at, joints_at
 
 SCHEMA = 1
@@ -134,6 +134,7 @@ class HandFile:
     tip_friction: Quantity = field(metadata=_limits("1", 0.0, 10.0))
     link_friction: Quantity = field(metadata=_limits("1", 0.0, 10.0))
     effects: tuple[Effect, ...] = ()
+    figures: Figures | None = None
 
     def __post_init__(self) -> None:
         if self.schema != SCHEMA:
@@ -146,6 +147,11 @@ class HandFile:
         _check_places(self.effects)
 
     @property
+    def nominal(self) -> Figures:
+        """What the scales multiply: figures of the file's own, else the vendor's."""
+        return self.figures or figures()
+
+    @property
     def without_effects(self) -> "HandFile":
         """The hand of the figures alone, which stance and starts are made for."""
         return dataclasses.replace(self, effects=())
@@ -153,7 +159,10 @@ class HandFile:
     @property
     def sha256(self) -> str:
         """Digest of the contents; layout and comments of the file do not enter."""
-        text = json.dumps(to_dict(self), sort_keys=True, separators=(",", ":"))
+        data = to_dict(self)
+        if self.figures is None:  # as files without the field always were
+            del data["figures"]
+        text = json.dumps(data, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
 

@@ -11,7 +11,7 @@ the hand file.
 import numpy as np
 
 from envs.hand.effect_scene import add_effect_parts
-from envs.hand.figures import FINGERS, Link, figures
+from envs.hand.figures import FINGERS, Link
 from envs.hand.hand_file import HandFile
 from envs.quiet_mujoco import mujoco
 
@@ -50,11 +50,11 @@ def build_spec(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjSpec
     _add_floor(spec, hand)
     palm = _add_palm(spec, hand, q_off)
     parent = palm
-    for index, link in enumerate(figures().links):
+    for index, link in enumerate(hand.nominal.links):
         parent = _add_link(palm if index % 4 == 0 else parent, link, index, hand)
         _add_drive(spec, link, index, hand)
     _exclude_neighbours(spec)
-    _add_sensors(spec)
+    _add_sensors(spec, hand)
     add_effect_parts(spec, hand, FLOOR)
     return spec
 
@@ -92,7 +92,7 @@ def _add_floor(spec: mujoco.MjSpec, hand: HandFile) -> None:
 def _add_palm(
     spec: mujoco.MjSpec, hand: HandFile, q_off: np.ndarray | None
 ) -> mujoco.MjsBody:
-    palm_figures = figures().palm
+    palm_figures = hand.nominal.palm
     mass = hand.palm_mass.value
     palm = spec.worldbody.add_body(
         name=PALM,
@@ -235,7 +235,7 @@ def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
         spec.add_exclude(bodyname1=PALM, bodyname2=f"finger1_link{other}")
 
 
-def _add_sensors(spec: mujoco.MjSpec) -> None:
+def _add_sensors(spec: mujoco.MjSpec, hand: HandFile) -> None:
     """Adds what `envs.signals` reads; names are `<quantity>_<object>`."""
     frame = {
         "quat": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
@@ -253,17 +253,17 @@ def _add_sensors(spec: mujoco.MjSpec) -> None:
                 objtype=mujoco.mjtObj.mjOBJ_SITE,
                 objname=site,
             )
-    for link in figures().links:
+    for link in hand.nominal.links:
         spec.add_sensor(
             name=f"torque_{link.joint}",
             type=mujoco.mjtSensor.mjSENS_JOINTACTFRC,
             objtype=mujoco.mjtObj.mjOBJ_JOINT,
             objname=link.joint,
         )
-    for link in figures().links:
+    for link in hand.nominal.links:
         if link.tip:
             _add_contact_sensor(spec, f"{link.body}_tip", force=True)
-    for link in figures().links:
+    for link in hand.nominal.links:
         if link.capsule and not link.tip:
             _add_contact_sensor(spec, link.body, force=False)
     _add_contact_sensor(spec, PALM, force=False)

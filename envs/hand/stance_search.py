@@ -15,11 +15,11 @@ from jaxtyping import Float
 from scipy.optimize import OptimizeResult, minimize
 
 from envs.errors import InputError
-from envs.hand.figures import FINGERS, figures
+from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PALM, build_model
+from envs.hand.spec import TIP_SPHERES
 
-TIP_RADIUS_M = 0.0075
 _RANGE_MARGIN_RAD = 0.1
 _HULL = [0, 4, 3, 2, 1]  # thumb, little, ring, middle, index: around the footprint
 _NEIGHBOURS = ((1, 2), (2, 3), (3, 4), (0, 1), (0, 4))
@@ -101,12 +101,13 @@ class StanceProblem:
         self.weights = weights
         self.model = model = build_model(hand)
         self.data = mujoco.MjData(model)
-        self.low, self.high = figures().per_joint("range_rad").T
+        self.low, self.high = hand.nominal.per_joint("range_rad").T
+        self._tip_radius = model.geom_size[[model.geom(n).id for n in TIP_SPHERES], 0]
         self._tips = [model.site(f"{finger}_tip").id for finger in FINGERS]
         self._tip_bodies = model.site_bodyid[self._tips]
         self._links = [
             model.geom(link.body).id
-            for link in figures().links
+            for link in hand.nominal.links
             if link.capsule and not link.tip
         ]
         self._palm = model.geom(PALM).id
@@ -137,7 +138,7 @@ class StanceProblem:
     def tip_gaps(self, x: Float[np.ndarray, "23"]) -> Float[np.ndarray, "5"]:
         """Gaps between tip spheres and floor [m]."""
         self._place(x)
-        return self.data.site_xpos[self._tips, 2] - TIP_RADIUS_M
+        return self.data.site_xpos[self._tips, 2] - self._tip_radius
 
     def residuals(self, x: Float[np.ndarray, "23"]) -> Float[np.ndarray, " n"]:
         """All preferences; their squares add up to the cost."""

@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from envs.config import override
-from envs.hand.figures import FINGERS, figures
+from envs.hand.figures import FINGERS, figures, kinematics_checks
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, build_model, build_spec
 from envs.hand.spec import (
@@ -17,7 +17,7 @@ from envs.hand.stance import load_stance
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
-CHECKS = figures().kinematics_checks
+CHECKS = kinematics_checks()
 
 
 def tips_in_palm(qpos):

@@ -1,0 +1,225 @@
+"""A user's MJCF carried over into a hand file, so that every backend runs it.
+
+Kinematics, inertia, limits and drive are the model's numbers in our frames; collision
+shapes are capsules and a box fitted to its colliding geoms. What the model lacks is
+taken from the vendor's figures and told. In the end both models must put the
+fingertips at the same places and weigh the same.
+"""
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from envs.errors import InputError
+from envs.hand.custom import load_custom_hand
+from envs.hand.custom_check import check_same
+from envs.hand.custom_drive import Drive, drive_of
+from envs.hand.custom_inertia import (
+    PALM_GROUP,
+    PAYLOAD_GROUP,
+    Inertia,
+    inertia_of,
+)
+from envs.hand.custom_palm import Frame
+from envs.hand.custom_place import Placed, place
+from envs.hand.custom_shape import (
+    bounds,
+    colliding_geoms,
+    link_capsule,
+    surface_points,
+)
+from envs.hand.figures import NAMES, Capsule, Figures, Link, Palm, figures
+from envs.hand.hand_file import (
+    HandFile,
+    JointQuantity,
+    Quantity,
+    Vector,
+    load_hand_file,
+)
+
+COMPILE_CPU_S = 60
+_SCALES = {
+    "kp": "stiffness_scale",
+    "kv": "damping_scale",
+    "force_limit": "torque_scale",
+}
+_NO_PAYLOAD_M = 0.001
+
+
+@dataclass(frozen=True)
+class ImportedHand:
+    """A user's hand as a hand file.
+
+    Attributes:
+        hand: the hand file, with figures of its own.
+        told: sentences that say what the model lacked and what took its place.
+    """
+
+    hand: HandFile
+    told: tuple[str, ...]
+
+
+def import_hand(
+    path: str | Path,
+    joint_map: Mapping[str, str] | None = None,
+    palm_quat: tuple[float, ...] | None = None,
+) -> ImportedHand:
+    """Makes a hand file of a user's MJCF.
+
+    Args:
+        path: main MJCF file; everything it names must lie in its folder.
+        joint_map: our joint name -> the model's, for those that differ.
+        palm_quat: our palm frame in the model's palm body, w x y z, where it does not
+            follow from the finger bases.
+
+    Returns:
+        The hand file: the default one in what an MJCF does not tell (delay, filter,
+        speed, friction).
+
+    Raises:
+        InputError: as `load_custom_hand`; or the model is another hand than five
+            fingers of four links on a palm, arranged as the WUJI right hand's.
+    """
+    custom = load_custom_hand(path, joint_map, COMPILE_CPU_S)
+    placed = place(custom, palm_quat)
+    actuators = [placed.model.actuator(name).id for name in custom.actuators]
+    drive = drive_of(placed.model, placed.joints, actuators)
+    shapes, told_shapes = _capsules(placed)
+    palm, told_palm = _palm(placed)
+    links = tuple(
+        _link(placed, index, drive, shapes[index]) for index in range(len(NAMES))
+    )
+    hand, told_hand = _hand_file(placed, Figures(palm, links), drive)
+    check_same(placed, hand)
+    told = (*custom.defaults, *drive.told, *told_shapes, *told_palm, *told_hand)
+    return ImportedHand(hand, told)
+
+
+def _capsules(placed: Placed) -> tuple[list[Capsule | None], tuple[str, ...]]:
+    """Capsules of links 2 to 4 of each finger; the vendor's where no geom collides."""
+    found: list[Capsule | None] = []
+    lacking = []
+    for index, vendor in enumerate(figures().links):
+        geoms = colliding_geoms(placed.model, placed.bodies[index])
+        if vendor.capsule is None:
+            found.append(None)
+        elif geoms:
+            frame = placed.link_w(index)
+            found.append(link_capsule(placed.model, placed.data, geoms, frame))
+        else:
+            found.append(vendor.capsule)
+            body = placed.bodies[index][0]
+            lacking.append(placed.model.body(body).name)
+    told = f"no colliding geom on {', '.join(lacking)}: the vendor's capsules"
+    return found, (told,) * bool(lacking)
+
+
+def _palm(placed: Placed) -> tuple[Palm, tuple[str, ...]]:
+    bodies = placed.bodies[PALM_GROUP]
+    inertia = _inertia(placed, bodies, placed.palm_w, "palm")
+    geoms = colliding_geoms(placed.model, bodies)
+    low, high = figures().palm.bounds_min, figures().palm.bounds_max
+    if geoms:
+        points = surface_points(placed.model, placed.data, geoms, placed.palm_w)
+        low, high = bounds(points)
+    palm = Palm(
+        **_inertial(inertia), bounds_min=_rounded(low), bounds_max=_rounded(high)
+    )
+    return palm, ("no colliding geom on the palm: the vendor's bounds",) * (not geoms)
+
+
+def _link(placed: Placed, index: int, drive: Drive, capsule: Capsule | None) -> Link:
+    body, joint = NAMES[index]
+    frame = placed.links[index]
+    if index % 4:
+        frame = placed.links[index - 1].inverse.of(frame)
+    inertia = _inertia(placed, placed.bodies[index], placed.link_w(index), body)
+    figure: dict[str, Any] = {
+        name: _short(values[index]) for name, values in drive.figures.items()
+    }
+    return Link(
+        body=body,
+        joint=joint,
+        pos=_rounded(frame.pos),
+        quat=_rounded(frame.quat),
+        range_rad=_rounded(placed.model.jnt_range[placed.joints[index]]),
+        capsule=capsule,
+        tip=capsule[1] if capsule and index % 4 == 3 else None,
+        **_inertial(inertia),
+        **figure,
+    )
+
+
+def _inertia(placed: Placed, bodies: list[int], frame: Frame, name: str) -> Inertia:
+    found = inertia_of(placed.model, placed.data, bodies, frame)
+    if not (found.mass > 0 and found.diagonal.min() > 0):
+        told = f"{name} with mass {found.mass:g} kg, inertia {found.diagonal}"
+        raise InputError(placed.custom.path, "", told, "mass and inertia above 0")
+    return found
+
+
+def _inertial(inertia: Inertia) -> dict[str, Any]:
+    return {
+        "mass": _short(inertia.mass),
+        "inertial_pos": _rounded(inertia.pos),
+        "inertial_quat": _rounded(inertia.quat),
+        "diaginertia": _rounded(inertia.diagonal),
+    }
+
+
+def _hand_file(
+    placed: Placed, own: Figures, drive: Drive
+) -> tuple[HandFile, tuple[str, ...]]:
+    """The default hand file with what the model tells in the place of its own."""
+    default, note = load_hand_file(), f"of {placed.custom.path.name}"
+    scales = {
+        _SCALES[name]: JointQuantity(1.0, "1", "user", note=f"{name} is that {note}")
+        for name in drive.own & set(_SCALES)
+    }
+    kept = [field for name, field in _SCALES.items() if name not in drive.own]
+    payload, told = _payload(placed, own, note)
+    if kept:
+        told += (f"{', '.join(kept)}: the default hand's, on the vendor's figures",)
+    hand = dataclasses.replace(
+        default,
+        name=f"hand {note}",
+        palm_mass=Quantity(own.palm.mass, "kg", "user", note=note),
+        palm_com_offset=Vector((0.0, 0.0, 0.0), "m", "user", note=note),
+        figures=own,
+        **payload,
+        **scales,
+    )
+    return hand, told
+
+
+def _payload(placed: Placed, own: Figures, note: str) -> tuple[dict, tuple[str, ...]]:
+    """The module on the back: mass, centre and box; a speck inside without one."""
+    bodies, told = placed.bodies[PAYLOAD_GROUP], ()
+    mass, pos = 0.0, np.array(own.palm.inertial_pos)
+    size = np.full(3, _NO_PAYLOAD_M)
+    if bodies:
+        inertia = inertia_of(placed.model, placed.data, bodies, placed.palm_w)
+        mass, pos = inertia.mass, inertia.pos
+        if geoms := colliding_geoms(placed.model, bodies):
+            points = surface_points(placed.model, placed.data, geoms, placed.palm_w)
+            size = np.ptp(points, axis=0)
+    else:
+        told = ("no body named payload: nothing is carried on the back",)
+    return {
+        "payload_mass": Quantity(_short(mass), "kg", "user", note=note),
+        "payload_pos": Vector(_rounded(pos), "m", "user", note=note),
+        "payload_size": Vector(_rounded(size), "m", "user", note=note),
+    }, told
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.12g}")
+
+
+def _rounded(values: Float[np.ndarray, " n"] | tuple[float, ...]) -> tuple:
+    return tuple(_short(value) for value in values)
