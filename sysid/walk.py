@@ -34,6 +34,14 @@ FULL = 3
 
 _PRIOR, _TANGENT, _ROBUST = 10.0, 1.0, 3.0
 
+_FLOOR = 0.3
+"""Deviation of parameters, in units of their axes, below which nothing is
+believed: short walks start from measured states, whose noise and smoothing bend what
+they show (found on walks with known causes)."""
+
+_TOLD = "floor_tilt"
+"""Effect that IMU and camera tell together, without any simulation or slope."""
+
 
 class Walk:
     """Residual of a walk as a function of all parameters."""
@@ -162,8 +170,9 @@ def _judged(
         held = np.arange(len(gains)) % 2 != side
         gains[held] = -0.5 * _costs(walk.residual(half), walk.block)[held]
     spread, wide = search.spread(theta[free], np.repeat(walk.block, walk.width))
+    floor = np.where([walk.axes[i].effect == _TOLD for i in free], 0.0, _FLOOR)
     half = np.zeros(len(theta))
-    half[free] = wide * spread
+    half[free] = wide * np.hypot(spread, floor)
     return Judged(hypothesis, gains - plain, theta, half)
 
 
