@@ -97,6 +97,8 @@ def import_hand(
     hand, told_hand = _hand_file(placed, Figures(palm, links), drive)
     check_same(placed, hand)
     told = (*custom.defaults, *drive.told, *told_shapes, *told_palm, *told_hand)
+    if placed.model.neq or placed.model.ntendon:
+        told += ("equality constraints and tendons are left out",)
     return ImportedHand(hand, told)
 
 

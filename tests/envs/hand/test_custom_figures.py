@@ -15,9 +15,10 @@ from envs.hand.custom_figures import import_hand
 from envs.hand.custom_palm import Frame, rotation
 from envs.hand.custom_place import place
 from envs.hand.figures import figures
-from envs.hand.hand_file import hand_yaml, load_hand_file
+from envs.hand.hand_file import JointQuantity, hand_yaml, load_hand_file
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
+from envs.keyboard import KeyboardEnv
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
@@ -172,6 +173,14 @@ def test_other_names_frames_and_meshes_are_the_same_hand(vendor):
     assert mujoco.MjModel.from_xml_path(str(vendor)).nmesh == 15  # nothing else
 
 
+def test_the_vendors_nominal_gains_are_scaled_as_ours_are(tmp_path):
+    one = JointQuantity(1.0, "1", "user")
+    nominal = dataclasses.replace(HAND, stiffness_scale=one, damping_scale=one)
+    found = import_hand(written(tmp_path / "hand.xml", build_spec(nominal)))
+    assert found.hand.stiffness_scale == HAND.stiffness_scale
+    assert_same(build_model(found.hand), MODEL)
+
+
 def test_a_shifted_link_and_a_lost_gram_are_seen(vendor):
     """Negative control of the comparison at the end of every import."""
     hand = import_hand(vendor, THEIRS).hand
@@ -226,18 +235,15 @@ def test_what_the_model_lacks_is_the_vendors_and_told(tmp_path):
     for geom in list(spec.body("finger4_link3").geoms):
         spec.delete(geom)
     spec.body(PAYLOAD).name = "pack"
+    spec.delete(spec.joint("root"))
+    tied = spec.add_equality(name1=JOINTS[6], name2=JOINTS[7])
+    tied.type, tied.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
     bare = written(tmp_path / "hand.xml", spec)
     found = import_hand(bare)
     told = " ".join(found.told)
-    for what in (
-        "servos",
-        "kv",
-        "torque limits",
-        "armature",
-        "payload",
-        "on finger4_link3",
-    ):
-        assert what in told
+    named = ["servos", "kv", "torque limits", "armature", "payload", "palm is fixed"]
+    named += ["equality constraints", "on finger4_link3"]
+    assert [what for what in named if what not in told] == []
     nominal = found.hand.nominal
     for name in ("kp", "kv", "force_limit", "armature"):
         wanted = figures().per_joint(name)
@@ -262,6 +268,13 @@ def test_the_environment_runs_the_imported_hand(ours):
     env = CrawlEnv(hand=hand)
     assert env.mj_model.jnt_range[8] == pytest.approx([-0.1, 1.2])
     assert float(env.plant.drive.kp[7]) == pytest.approx(0.5)
+
+
+def test_the_keyboard_task_refuses_it():
+    """Its fingertip is told by the vendor's figures, here and on the robot."""
+    own = dataclasses.replace(HAND, figures=figures())
+    with pytest.raises(InputError, match="hand file: figures"):
+        KeyboardEnv(hand=own)
 
 
 FIELDS = [
