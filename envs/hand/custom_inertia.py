@@ -80,6 +80,8 @@ def inertia_of(
         tensor += axes @ np.diag(model.body_inertia[body]) @ axes.T
         tensor += m * (away @ away * np.eye(3) - np.outer(away, away))
     values, vectors = np.linalg.eigh(frame.mat.T @ tensor @ frame.mat)
+    # Rounding must not leave a plate with moments that no body has.
+    values[2] = min(values[2], (values[0] + values[1]) * (1.0 - 1e-9))
     vectors = vectors * np.sign(np.linalg.det(vectors))
     in_frame = frame.inverse.of(Frame(centre, np.eye(3))).pos
     return Inertia(total, in_frame, Frame(in_frame, vectors).quat, values)

@@ -14,7 +14,7 @@ from envs.hand.custom_check import TIP_ERROR_M, check_same, tip_error_m
 from envs.hand.custom_figures import import_hand
 from envs.hand.custom_palm import Frame, rotation
 from envs.hand.custom_place import place
-from envs.hand.figures import figures
+from envs.hand.figures import NAMES, figures
 from envs.hand.hand_file import JointQuantity, hand_yaml, load_hand_file
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
@@ -270,6 +270,15 @@ def test_the_environment_runs_the_imported_hand(ours):
     assert float(env.plant.drive.kp[7]) == pytest.approx(0.5)
 
 
+def test_a_flat_link_keeps_moments_that_a_body_can_have(tmp_path):
+    spec = build_spec(HAND)
+    for body, _ in NAMES:
+        spec.body(body).inertia = [1e-6, 1e-6, 2e-6]
+    hand = import_hand(written(tmp_path / "hand.xml", spec)).hand
+    found = np.sort(build_model(hand).body_inertia[3:], axis=1)
+    np.testing.assert_allclose(found[:, :2].sum(axis=1), found[:, 2], rtol=1e-8)
+
+
 def test_the_keyboard_task_refuses_it():
     """Its fingertip is told by the vendor's figures, here and on the robot."""
     own = dataclasses.replace(HAND, figures=figures())
@@ -289,6 +298,11 @@ FIELDS = [
     ("bounds_max: [0.0141", "bounds_max: [-0.4", "figures.palm.bounds_max: found"),
     ("armature: 0.0005", "armature: .nan", "figures.links.0.armature: found"),
     ("tip: [-0.00105", "tap: [-0.00105", "figures.links.3.tap: found tap"),
+    (
+        "diaginertia: [3.37599e-07",
+        "diaginertia: [6.0e-07",
+        "links.0.diaginertia: found",
+    ),
     ("range_rad: [0.0475", "range_rad: [2.0", "figures.links.0.range_rad: found"),
 ]
 
