@@ -15,6 +15,9 @@ from sysid.diagnosis import Diagnosis
 SHOWN_S = 12.0
 """Length of the stretch that is drawn [s]."""
 
+UNITS = {"speed": "rad/s, m/s", "angle": "rad, m", "effort": "N·m, N", "time": "s"}
+"""Units of what a residual may depend on, of turning and sliding joints."""
+
 BEFORE, AFTER, MEASURED = "#c44e52", "#4c72b0", "#222222"
 
 
@@ -122,8 +125,8 @@ def _angles(one: Examined) -> Figure:
         top.plot(t_s, angle, color=color, lw=1, label=f"simulated {name}")
         bottom.plot(t_s, measured - angle, color=color, lw=1)
     top.legend(ncols=4, fontsize=8)
-    top.set_ylabel("angle")
-    bottom.set_ylabel("error")
+    top.set_ylabel("angle [rad, m]")
+    bottom.set_ylabel("error [rad, m]")
     bottom.set_xlabel("time [s]")
     return figure
 
@@ -142,7 +145,7 @@ def _residuals(one: Examined) -> Figure:
             valid = one.problem.valid[k, inside, piece]
             shown = np.where(valid, raw[k, inside, piece], np.nan)
             axes[k].plot(one.track.dt * rows[inside], shown, color=color, lw=1)
-            axes[k].set_ylabel(f"{name}\n[torque]")
+            axes[k].set_ylabel(f"{name}\n[N·m, N]")
     axes[1].set_xlabel("time [s]")
     return figure
 
@@ -168,9 +171,9 @@ def _features(one: Examined) -> Figure:
             for axis, (name, feature) in zip(axes[k], features.items(), strict=True):
                 if valid.any():
                     axis.plot(*_means(feature[valid], raw[k][valid]), color=color)
-                axis.set_xlabel(name, fontsize=8)
+                axis.set_xlabel(f"{name} [{UNITS[name]}]", fontsize=8)
     for k, name in enumerate(("controller", "mechanics")):
-        axes[k, 0].set_ylabel(name)
+        axes[k, 0].set_ylabel(f"{name} [N·m, N]")
     return figure
 
 

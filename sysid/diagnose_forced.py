@@ -51,7 +51,7 @@ class Track:
     """Measured motion of one joint in all pieces (p), step by step (t).
 
     Attributes:
-        cmd, pos, vel, acc: target, encoder angle and its derivatives.
+        cmd, pos, vel, acc, jerk: target, encoder angle and its derivatives.
         held, share: see `Piece`.
         slow_vel: speed that passed the band of the residuals, for friction.
         effort: measured torque of the drive [N·m]; zero where it is not logged.
@@ -74,6 +74,7 @@ class Track:
     pos: Float[Array, "t p"]
     vel: Float[Array, "t p"]
     acc: Float[Array, "t p"]
+    jerk: Float[Array, "t p"]
     slow_vel: Float[Array, "t p"]
     effort: Float[Array, "t p"]
     push: Float[Array, "t p"]
@@ -179,8 +180,8 @@ def forced_residuals(
         track: the measured motion.
         params: values of the parameters of the effects by name.
         nuisance: `effort_gain`, `mass`, `push_gain` (factors), `skew_s` (age of the
-            angle against the effort), `rotor` (inertia on the motor's side of a play
-            [kg·m²]).
+            angle against the effort), `hold_s` (mean age at which a torque acts),
+            `rotor` (inertia on the motor's side of a play [kg·m²]).
         friction_speed: speed below which a joint may be at rest.
         dt: step of the grid [s].
         names: effects in the order of the chain.
@@ -189,8 +190,8 @@ def forced_residuals(
     wide = {
         n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in _RIGID
     }
-    figures = ("effort_gain", "mass", "skew_s", "push_gain", "rotor")
-    gain, mass, skew, pushed, rotor = (nuisance[k][None, :] for k in figures)
+    figures = ("effort_gain", "mass", "skew_s", "hold_s", "push_gain", "rotor")
+    gain, mass, skew, hold, pushed, rotor = (nuisance[k][None, :] for k in figures)
     gap, soft, rotor = _between(params, rotor)
 
     def model(now):
@@ -238,7 +239,7 @@ def forced_residuals(
         encoder, speed = states[-2]
         ratio = speed / (qd + 1.0 * ~moves)
         steep = ratio * moves + steep * ~moves
-        acc = now["acc"] / steep
+        acc = (now["acc"] + (skew + hold) * now["jerk"]) / steep
         force = x.passive + x.load - (inertia - own) * acc
         behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
         needs = x.torque - own * acc + pull

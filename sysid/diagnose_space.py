@@ -29,6 +29,10 @@ SIGMA = 3.0**-0.5
 SKEW_S = 5e-4
 """Largest age of the angle against the effort that is no news [s]."""
 
+HOLD_S = 5e-4
+"""Largest mean age of an acting torque that is no news: a servo of 1 kHz keeps one for
+a millisecond [s]."""
+
 DELAY_S = 1e-3
 """Largest deviation of a known delay that is no news, whatever its tolerance [s]."""
 
@@ -178,6 +182,7 @@ def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> 
         _pseudo("effort_gain", "1", "log", 1.0, drive.effort_scale.tolerance),
         _pseudo("mass", "1", "log", 1.0, MASS),
         _pseudo("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
+        _pseudo("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
     ]
     inertia = float(np.mean(np.asarray(track.track.inertia)))
     rotor = 0.5 * track.armature if track.armature > 0.0 else 0.1 * inertia

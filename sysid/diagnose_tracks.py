@@ -122,6 +122,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         pos=stack([p.pos[:, j] for p in pieces]),
         vel=stack([p.vel[:, j] for p in pieces]),
         acc=stack([p.acc[:, j] for p in pieces]),
+        jerk=stack([np.gradient(p.acc[:, j], step_s) for p in pieces]),
         slow_vel=stack(slow),
         effort=stack([np.nan_to_num(e) for e in efforts]),
         push=stack([b.push[:, j] for b in bodies]),

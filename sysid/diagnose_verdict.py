@@ -9,7 +9,7 @@ from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
 from sysid.diagnose_model import Model, gain_nat
 from sysid.diagnose_problem import CHANNELS
-from sysid.diagnose_search import Search
+from sysid.diagnose_search import THRESHOLD, Search
 from sysid.diagnose_space import Slot
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
@@ -219,9 +219,17 @@ def _alternatives(found: Search) -> tuple[Alternative, ...]:
         effect = next(e for e in model.effects if e not in found.best.effects)
         gap = gain - gain_nat(without, model, found.samples)
         told = gap > max(SURE, NEARLY * gain) or effect in NESTED.get(cause, ())
+        # Chance alone gives some effects as much as a figure's small step is worth.
+        told = told or (gain - gap < THRESHOLD and not _confusable(effect, cause))
         if np.isfinite(gap) and gap < 0.9 * gain:
             result.append(Alternative(effect, round(gap, 3), bool(told)))
     return tuple(sorted(result, key=lambda a: a.score_gap)[:8])
+
+
+def _confusable(one: str, other: str) -> bool:
+    """Tells whether two effects leave like traces."""
+    pair = CATALOGUE[one].confusable_with, CATALOGUE[other].confusable_with
+    return other in pair[0] or one in pair[1]
 
 
 def _blind(searched) -> tuple[str, ...]:

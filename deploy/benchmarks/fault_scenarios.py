@@ -69,13 +69,14 @@ def _health(field: str, value: Callable[[Rng], float]) -> Install:
 
 def _one_joint(field: str, value: Callable[[Rng], float]) -> Callable:
     """Sets one entry of a field, the same for the whole trial."""
-    chosen: dict[int, tuple[int, float]] = {}
+    # With the generator itself, or another one might come to have its number.
+    chosen: dict[int, tuple[Rng, int, float]] = {}
 
     def change(sample, rng, t0, t):
         array = np.array(getattr(sample, field))
         if id(rng) not in chosen:
-            chosen[id(rng)] = int(rng.integers(len(array))), value(rng)
-        place, number = chosen[id(rng)]
+            chosen[id(rng)] = rng, int(rng.integers(len(array))), value(rng)
+        _, place, number = chosen[id(rng)]
         array[place] = number
         return replace(sample, **{field: array})
 
