@@ -197,7 +197,8 @@ class Push(BareTask):
     ) -> dict[str, Array]:
         """Cube and target: positions [m], velocity [m/s], distance and progress.
 
-        `progress_mps` is the decrease of the distance over the control step.
+        `progress_mps` is the decrease of the distance over the control step; `fallen`
+        is 1 where the episode ends by a fall.
         """
         del plant
         task, qpos = carried["task"], output.state.qpos
@@ -210,6 +211,7 @@ class Push(BareTask):
             "target_error_m": error,
             "progress_mps": (task.error_m - error) / self.config.control_dt_s,
             "pocket_to_object_m": self._object_v(qpos) - jnp.array(POCKET_V),
+            "fallen": fallen(signals, self.config).astype(jnp.float32),
         }
 
     def privileged(

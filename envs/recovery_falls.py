@@ -146,9 +146,13 @@ def _draw_curl(rng: np.random.Generator, model: mujoco.MjModel) -> np.ndarray:
 
 def _draw_lean(rng: np.random.Generator, side: str) -> np.ndarray:
     """Orientation w x y z that turns the side, with some lean, downward."""
-    axis = np.add(SIDES[side], rng.uniform(-_LEAN, _LEAN, 3))
-    axis /= np.linalg.norm(axis)
-    quat = np.array([1.0 - axis[2], -axis[1], axis[0], 0.0])
+    return turned_down(np.add(SIDES[side], rng.uniform(-_LEAN, _LEAN, 3)))
+
+
+def turned_down(axis: np.ndarray) -> np.ndarray:
+    """Orientation w x y z in which a direction in the palm frame points down."""
+    x, y, z = axis / np.linalg.norm(axis)
+    quat = np.array([1.0 - z, -y, x, 0.0])
     return quat / np.linalg.norm(quat)
 
 

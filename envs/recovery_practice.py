@@ -1,14 +1,17 @@
-"""Practice poses: the hand sinking from its stance; training may start from them.
+"""Practice poses: the hand on its way down from the stance; training may start there.
 
 Between a palm that lies flat and the stance there is no way up on which every step
 pays, and exploration from fallen poses alone stays with the palm flat. Poses from all
 along the way down let the policy learn the last part of the way up first (a reverse
-curriculum). They are ours; the paper names none. `recovery_practice.json` beside this
-module is the result for the default hand file.
+curriculum): some sink from the stance, others tip over toward one of the falls, as a
+hand does that stands on its wrist end and throws its fingers forward. They are ours;
+the paper names none. `recovery_practice.json` beside this module is the result for the
+default hand file.
 """
 
 import json
-from functools import cache
+from collections.abc import Callable
+from functools import cache, partial
 from importlib.resources import files
 
 import mujoco
@@ -19,20 +22,25 @@ from envs.hand.hand_file import HandFile
 from envs.hand.model import build_model
 from envs.hand.stance import Stance
 from envs.recovery_falls import (
+    Falls,
     clearance_m,
     curl,
     down_b,
+    falls_of,
     lie_down,
     load_falls,
     rounded,
+    turned_down,
 )
 
-POSES = 64
+SINKING, TIPPING = 64, 32
+"""Numbers of poses of the two kinds."""
+
 _SEED = 20260122
 _REACH_RAD = 1.3
 _LEAN_RAD = 1.0
 _SINKING_S = (0.02, 2.0)
-_MOST_TILT_RAD = np.deg2rad(70.0)
+_MOST_SUNK_RAD = np.deg2rad(70.0)
 _TILT_TOLERANCE_RAD = np.deg2rad(5.0)
 _DEEPEST_M = 1e-3
 _TRIES = 400
@@ -64,13 +72,14 @@ def practice_json(poses: Poses) -> str:
 
 
 def settle_practice(hand: HandFile, stance: Stance) -> Poses:
-    """Simulates `POSES` poses; deterministic.
+    """Simulates the practice poses; deterministic.
 
-    The hand has its joint targets up to 1.3 rad from the stance's, leans by up to 1 rad
-    from the stance's orientation, is put down just above the floor and sinks for 0.02
-    to 2 s (even in the logarithm), after which its motion is forgotten. Such draws are
-    repeated until the tilt is within 5 degrees of that wanted, which grows from pose to
-    pose up to 70 degrees, and nothing reaches into the floor.
+    The hand is put down just above the floor and sinks for 0.02 to 2 s (even in the
+    logarithm), after which its motion is forgotten. Such draws are repeated until the
+    tilt is within 5 degrees of that wanted, which grows from pose to pose, and nothing
+    reaches into the floor. `SINKING` poses, up to 70 degrees, begin with joint targets
+    up to 1.3 rad from the stance's, leaning by up to 1 rad. `TIPPING` poses, from 70
+    degrees to the farthest fall, begin between stance and a fall.
 
     Args:
         hand: the hand file.
@@ -80,28 +89,63 @@ def settle_practice(hand: HandFile, stance: Stance) -> Poses:
         InputError: there is no such pose.
     """
     model, rng = build_model(hand), np.random.default_rng(_SEED)
+    draws = [partial(_sink, rng, model, stance)] * SINKING
+    falls = falls_of(hand, stance)
     level = down_b(np.array(stance.qpos))
-    poses = []
-    for wanted in np.linspace(0.0, _MOST_TILT_RAD, POSES):
-        for _ in range(_TRIES):
-            qpos = _sink(rng, model, stance)
-            tilt = np.arccos(np.clip(down_b(qpos) @ level, -1.0, 1.0))
-            near = abs(tilt - wanted) < _TILT_TOLERANCE_RAD
-            if near and clearance_m(model, qpos) > -_DEEPEST_M:
-                poses.append(rounded(qpos))
-                break
-    if len(poses) < POSES:
-        raise InputError("practice poses", "", f"{len(poses)} poses", f"{POSES}")
-    return tuple(poses)
+    farthest = max(_angle(down_b(np.array(q)), level) for q in falls.qpos)
+    draws += [partial(_tip, rng, model, stance, falls)] * TIPPING
+    tilts = (
+        *np.linspace(0.0, _MOST_SUNK_RAD, SINKING),
+        *np.linspace(_MOST_SUNK_RAD, farthest, TIPPING),
+    )
+    pairs = zip(draws, tilts, strict=True)
+    return tuple(_pose(model, level, draw, tilt) for draw, tilt in pairs)
+
+
+def _pose(
+    model: mujoco.MjModel,
+    level: np.ndarray,
+    draw: Callable[[], np.ndarray],
+    tilt_rad: float,
+) -> tuple[float, ...]:
+    """Draws until the hand has the tilt and does not reach into the floor."""
+    for _ in range(_TRIES):
+        qpos = draw()
+        near = abs(_angle(down_b(qpos), level) - tilt_rad) < _TILT_TOLERANCE_RAD
+        if near and clearance_m(model, qpos) > -_DEEPEST_M:
+            return rounded(qpos)
+    wanted = f"one at {np.rad2deg(tilt_rad):.0f}° of tilt"
+    raise InputError("practice poses", "", f"none in {_TRIES} draws", wanted)
 
 
 def _sink(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance
 ) -> np.ndarray:
-    share, duration_s = rng.uniform(), np.exp(rng.uniform(*np.log(_SINKING_S)))
+    share, duration_s = rng.uniform(), _draw_duration_s(rng)
     target = _draw_target(rng, model, stance, share)
     joints, quat = curl(model, stance, target), _draw_lean(rng, stance, share)
     return lie_down(model, joints, target, quat, duration_s).qpos
+
+
+def _tip(
+    rng: np.random.Generator, model: mujoco.MjModel, stance: Stance, falls: Falls
+) -> np.ndarray:
+    k, share = rng.integers(len(falls.side)), rng.uniform()
+    over = (1.0 - share) * down_b(np.array(stance.qpos))
+    over = over + share * down_b(np.array(falls.qpos[k]))
+    bent = rng.uniform()
+    target = (1.0 - bent) * _draw_target(rng, model, stance, rng.uniform())
+    target = target + bent * np.array(falls.target_rad[k])
+    joints, duration_s = curl(model, stance, target), _draw_duration_s(rng)
+    return lie_down(model, joints, target, turned_down(over), duration_s).qpos
+
+
+def _draw_duration_s(rng: np.random.Generator) -> float:
+    return float(np.exp(rng.uniform(*np.log(_SINKING_S))))
+
+
+def _angle(one: np.ndarray, other: np.ndarray) -> float:
+    return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
 
 
 def _draw_target(
