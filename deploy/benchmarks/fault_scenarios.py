@@ -67,20 +67,21 @@ def _health(field: str, value: Callable[[Rng], float]) -> Install:
     return install
 
 
-def _one_joint(field: str, value: Callable[[Rng], float]) -> Callable:
-    """Sets one entry of a field, the same for the whole trial."""
-    # With the generator itself, or another one might come to have its number.
-    chosen: dict[int, tuple[Rng, int, float]] = {}
+def _one_joint(kind: type, field: str, value: Callable[[Rng], float]) -> Install:
+    """Sets one entry of a field of every sample, the same for the whole trial."""
 
-    def change(sample, rng, t0, t):
-        array = np.array(getattr(sample, field))
-        if id(rng) not in chosen:
-            chosen[id(rng)] = rng, int(rng.integers(len(array))), value(rng)
-        _, place, number = chosen[id(rng)]
-        array[place] = number
-        return replace(sample, **{field: array})
+    def install(lab: Lab, rng: Rng) -> None:
+        size = {"gyro_b": 3}.get(field, 20)
+        place, number = int(rng.integers(size)), value(rng)
 
-    return change
+        def change(sample, rng, t0, t):
+            array = np.array(getattr(sample, field))
+            array[place] = number
+            return replace(sample, **{field: array})
+
+        _samples(kind, change)(lab, rng)
+
+    return install
 
 
 def _late(sample, rng, t0, t):
@@ -173,8 +174,19 @@ def _blocked(lab: Lab, rng: Rng) -> None:
 _error_bit = _health("error_code", lambda r: 1 << int(r.choice([0, 3, 7, 8, 13])))
 
 
-def _stall(lab: Lab, rng: Rng) -> None:
-    _samples(Reading, _one_joint("effort_a", lambda r: r.uniform(0.92, 1.0)))(lab, rng)
+def _outside(lab: Lab, rng: Rng) -> None:
+    """A joint is read beyond its limits, or a sensor of it says so, on either side."""
+    joint = int(rng.integers(20))
+    low, high = lab.core.limits.factory_rad[joint]
+    far = rng.uniform(0.06, 2.0)
+    number = low - far if rng.random() < 0.5 else high + far
+
+    def change(sample, rng, t0, t):
+        pos = sample.pos_rad.copy()
+        pos[joint] = number
+        return replace(sample, pos_rad=pos)
+
+    _samples(Reading, change)(lab, rng)
 
 
 class _Gone:
@@ -260,27 +272,27 @@ SCENARIOS = (
     Scenario("S2", "frozen joints", _frozen(Reading), 0.150, SAFE, 0.60),
     Scenario("S2", "frozen IMU", _frozen(ImuReading), 0.150, SAFE, 0.60),
     Scenario("S2b", "slow path silent", _probe_lost, 0.400, SAFE, 0.60),
-    Scenario("S3", "bad angle", _samples(Reading, _one_joint("pos_rad", _bad_number)),
+    Scenario("S3", "bad angle", _one_joint(Reading, "pos_rad", _bad_number),
              0.020, SAFE, 0.10),
-    Scenario("S3", "bad gyro", _samples(ImuReading, _one_joint("gyro_b", _bad_number)),
+    Scenario("S3", "bad gyro", _one_joint(ImuReading, "gyro_b", _bad_number),
              0.020, SAFE, 0.10),
     Scenario("S3", "flapping NaN", _flapping, 0.020 + 0.5, SAFE, 1.6),
     Scenario("S4", "bad target", _proposals(_nan_target), 0.041, SAFE, 0.12),
     Scenario("S4", "far target", _proposals(_far_target), 0.041, SAFE, 0.12),
     Scenario("S4", "network gives NaN", _broken_network, 0.041, HOLDING, 0.3),
     Scenario("S5", "over-current",
-             _samples(Reading, _one_joint("effort_a", lambda r: r.uniform(1.06, 3.0))),
+             _one_joint(Reading, "effort_a", lambda r: r.uniform(1.06, 3.0)),
              0.050, SAFE, 0.20),
-    Scenario("S5", "stall", _stall, 1.050, SAFE, 1.2),
+    Scenario("S5", "stall",
+             _one_joint(Reading, "effort_a", lambda r: r.uniform(0.92, 1.0)),
+             1.050, SAFE, 1.2),
     Scenario("S6", "effort limit changed", _health("effort_limit_a", lambda r: 1.5),
              0.600, SAFE, 2.4),
     Scenario("S6", "joint hot", _health("temperature_c", lambda r: r.uniform(80, 99)),
              0.600, SAFE, 2.4),
     Scenario("S6", "error bit", _error_bit, 0.600, SAFE, 2.4),
     Scenario("S7", "toppled", _toppled, 0.250, SAFE, 0.9),
-    Scenario("S8", "joint outside",
-             _samples(Reading, _one_joint("pos_rad", lambda r: 2.5 + r.uniform())),
-             0.060, HOLDING, 1.0),
+    Scenario("S8", "joint outside", _outside, 0.060, HOLDING, 1.0),
     Scenario("S8b", "finger caught", _blocked, 0.560, HOLDING, 1.0),
     Scenario("S10", "gamepad lost", _gamepad_lost, 1.060, SAFE, 3.0),
     Scenario("S11", "policy hangs", _hang, 0.100, SAFE, 0.56),

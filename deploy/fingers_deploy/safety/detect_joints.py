@@ -53,12 +53,22 @@ def detect_joints(
     _lasting(found, "S5", "stalled", memory.stall_s, t, limits.stall_s)
     _lasting(found, "S5", "over-current", memory.over_s, t, limits.over_effort_s)
     _lasting(found, "S8b", "not following", memory.track_s, t, limits.tracking_s)
-    low, high = limits.factory_rad[:, 0], limits.factory_rad[:, 1]
-    beyond = np.maximum(low - reading.pos_rad, reading.pos_rad - high)
+    beyond = _beyond(reading.pos_rad, limits)
     worst = int(beyond.argmax())
     if beyond[worst] > limits.joint_margin_rad:
         found["S8"] = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
     return memory, found
+
+
+def believable(pos_rad: Array, limits: Limits) -> NDArray[np.bool_]:
+    """Which joint angles may be held: those that S8 does not report; not NaN, [20]."""
+    return _beyond(pos_rad, limits) <= limits.joint_margin_rad
+
+
+def _beyond(pos_rad: Array, limits: Limits) -> Array:
+    """How far each joint is outside its factory limits, negative inside [rad]."""
+    low, high = limits.factory_rad[:, 0], limits.factory_rad[:, 1]
+    return np.maximum(low - pos_rad, pos_rad - high)
 
 
 def _since(since: Array, holds: NDArray[np.bool_], t: float) -> Array:

@@ -18,7 +18,11 @@ from numpy.typing import NDArray
 from fingers_deploy.safety.arming import ALL_JOINTS, Arming, start_arming, step_arming
 from fingers_deploy.safety.detect_body import detect_tilt
 from fingers_deploy.safety.detect_health import detect_health
-from fingers_deploy.safety.detect_joints import JointMemory, detect_joints
+from fingers_deploy.safety.detect_joints import (
+    JointMemory,
+    believable,
+    detect_joints,
+)
 from fingers_deploy.safety.detect_loop import detect_loop
 from fingers_deploy.safety.detect_policy import (
     LeaseMemory,
@@ -26,11 +30,7 @@ from fingers_deploy.safety.detect_policy import (
     renew_lease,
     steps_behind,
 )
-from fingers_deploy.safety.detect_sensors import (
-    SensorMemory,
-    detect_sensors,
-    valid_joints,
-)
+from fingers_deploy.safety.detect_sensors import SensorMemory, detect_sensors
 from fingers_deploy.safety.latch import Fault, latch, severest
 from fingers_deploy.safety.limits import Limits
 from fingers_deploy.safety.motion import toward
@@ -76,7 +76,7 @@ class State:
         since_s: when it was entered [s].
         t_s: time of the step before [s]; None before the first.
         target_rad: the targets on the wire; while de-energized the measured pose, [20].
-        pose_rad: last valid measured pose, [20].
+        pose_rad: last valid measured angle of each joint, [20].
         goal_rad: newest targets of the policy that may pass, [20]; None in other modes.
         faults: the latched faults.
         sensors, joints, lease, tilt_since_s: memories of the detectors.
@@ -156,8 +156,10 @@ def _detect(
     found |= detect_health(inputs, t, limits)
     found |= detect_loop(t if state.t_s is None else state.t_s, inputs, t, limits)
     pose = state.pose_rad
-    if inputs.reading is not None and valid_joints(inputs.reading):
-        pose = inputs.reading.pos_rad
+    if inputs.reading is not None:
+        pos = inputs.reading.pos_rad
+        # A joint that cannot be where it says is held where it last could be.
+        pose = np.where(believable(pos, limits), pos, pose)
     state = dataclasses.replace(
         state,
         t_s=t,

@@ -237,6 +237,21 @@ def test_a_joint_that_does_not_follow_trips(make_rig):
     assert "S8b" in {f.id for f in rig.state.faults}
 
 
+@pytest.mark.parametrize("angle_rad", [2.5, -6.283, NAN])
+def test_an_angle_that_cannot_be_is_not_held(rig, angle_rad):
+    """The joint stays where it was, instead of going to its limit at full speed."""
+    where = rig.state.pose_rad.copy()
+    rig.fault = lambda inputs, t: _reading(
+        pos_rad=lambda r: _set(r.pos_rad, 2, angle_rad)
+    )(inputs, 0, t)
+    rig.run(0.03)
+    assert rig.state.mode == Mode.STOPPING
+    np.testing.assert_allclose(rig.out.target_rad, where, atol=0.03)
+    rig.run(1.0)
+    if rig.out.target_rad is not None:
+        np.testing.assert_allclose(rig.out.target_rad, where, atol=0.03)
+
+
 @pytest.mark.parametrize("finger", range(5))
 def test_one_finger_that_freezes_while_it_moves_is_found(rig, finger):
     """In time after its targets have moved by 0.1 rad, and it stays found."""
