@@ -21,6 +21,7 @@ from fault_scenarios import SCENARIOS, Scenario
 from fault_startup import STARTS, start_up, stopped_rightly
 from fault_trials import passes, run_trial
 from hand_files import WALKING, write_model
+from stamp import sentence, stamp
 
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.safety import ROWS, Mode
@@ -32,7 +33,7 @@ ALLOWED_TRIPS = {0.5: 1}  # 20 lost packets in a row: once in a million
 LINK_HZ = 500.0  # packets per second on the way from the hand
 
 
-ELSEWHERE = """\
+ELSEWHERE = """
 - **S14, the whole computer hangs:** the board's watchdog (at most 15 s, see
   `docs/deploy.md`); it cannot be measured without the board. Nothing arms at boot.
 - **S16, another or a damaged policy:** refused before anything is opened, status 2 with
@@ -42,8 +43,7 @@ ELSEWHERE = """\
   with every input, and random sequences, in `deploy/tests/safety/test_machine.py`.
 - **L7, jumps of the wall clock** by an hour, to 1970, back and forth: targets equal bit
   for bit (`deploy/tests/runtime/test_core.py`).
-- **L1 to L5, timing:** `docs/deploy-results.md`.
-"""
+- **L1 to L5, timing:** `docs/deploy-results.md`."""
 
 
 def measure_scenario(starts: list[Lab], scenario: Scenario, trials: int, seed: int):
@@ -116,12 +116,25 @@ def measure(options: argparse.Namespace, folder: Path) -> dict:
     results: dict = {
         "policy": bundle.manifest.task,
         "loop_hz": hz,
-        "seed": options.seed,
+        "measured": {},
     }
     for name in options.parts:
+        results["measured"][name] = stamp(_command(name, options), options.seed)
         results[name] = parts[name]()
         print(name, json.dumps(results[name]), file=sys.stderr)
     return results
+
+
+def _command(part: str, options: argparse.Namespace) -> list[str]:
+    """The command that measures one part alone, without its output."""
+    size = {
+        "matrix": ["--trials", options.trials],
+        "starts": ["--start-trials", options.start_trials],
+        "links": ["--loss-s", f"{options.loss_s:g}"],
+        "processes": ["--process-trials", options.process_trials],
+        "fault_free": ["--hours", f"{options.hours:g}"],
+    }
+    return ["fault_matrix.py", "--parts", part, *map(str, size[part])]
 
 
 def measure_links(model: Path, bundle: Bundle, options: argparse.Namespace) -> dict:
@@ -165,6 +178,7 @@ def _deaths(model: Path, bundle: Path, trials: int) -> list[dict]:
 def as_markdown(results: dict) -> str:
     """The results as a page."""
     free = results["fault_free"]
+    when = {part: sentence(each) for part, each in results["measured"].items()}
     parts = [
         "# Safety table",
         "Written by `python deploy/benchmarks/fault_matrix.py`; see `docs/deploy.md` "
@@ -181,20 +195,25 @@ def as_markdown(results: dict) -> str:
         "include the wait for the next answer of the policy (20 ms) or read-back "
         "(200 ms). With no failure in 100 trials the failure rate is below "
         "3 % (95 %).",
+        when["matrix"],
         _table(results["matrix"]),
         "## Before the policy runs",
+        when["starts"],
         _table(results["starts"]),
         "## Packet loss (S9)\n\n500 packets per second, of which a share is lost at "
         "random: stops in this time. Below it, the reaction to losing everything for a "
         "while.",
+        when["links"],
         _table(results["links"]["losses"]),
         _table(results["links"]["bursts"]),
         "## Real processes, in real time (S11, S12, S13)\n\nFor the supervisor it is "
         "the time to confirmed power off; until then the hand holds its last target.",
+        when["processes"],
         _table(results["processes"]),
         f"## Without a fault\n\n{free['hours']} h of walking: "
         f"{free['false_trips']} false stops.",
-        "## Rows that are not in the tables\n\n" + ELSEWHERE,
+        when["fault_free"],
+        "## Rows that are not in the tables\n" + ELSEWHERE,
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -243,7 +262,9 @@ def main() -> int:
     results["wall_s"] = round(time.time() - start)
     kept = options.out.with_suffix(".json")
     if kept.exists():
-        results = json.loads(kept.read_text()) | results
+        before = json.loads(kept.read_text())
+        results["measured"] = before["measured"] | results["measured"]
+        results = before | results
     kept.write_text(json.dumps(results, indent=1) + "\n")
     if set(PARTS) <= set(results):
         options.out.with_suffix(".md").write_text(as_markdown(results), "utf-8")
