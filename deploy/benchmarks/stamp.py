@@ -46,7 +46,7 @@ def _git(*words: str) -> str:
     done = subprocess.run(
         ["git", *words], cwd=HERE, capture_output=True, text=True, check=False
     )
-    return done.stdout.strip() or "" if done.returncode == 0 else "unknown"
+    return done.stdout.strip() if done.returncode == 0 else "unknown"
 
 
 def sentence(measured: dict) -> str:

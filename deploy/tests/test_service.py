@@ -4,6 +4,7 @@ import configparser
 import contextlib
 import os
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -44,9 +45,9 @@ def test_it_is_watched_de_energizes_at_its_end_and_starts_by_hand_only():
 def test_hand_and_console_are_not_open_to_everybody():
     rules = (UNITS / "99-wuji-hand.rules").read_text()
     assert 'MODE="0660"' in rules and "0666" not in rules
-    socket = unit("fingers-deploy.socket")["Socket"]
-    assert socket["SocketMode"] == "0600"
-    assert not any(key.startswith("Listen") and key != "ListenFIFO" for key in socket)
+    console = unit("fingers-deploy.socket")["Socket"]
+    assert console["SocketMode"] == "0600"
+    assert not any(key.startswith("Listen") and key != "ListenFIFO" for key in console)
 
 
 @pytest.fixture
@@ -70,6 +71,17 @@ def service(hand_model, marching_dir, tmp_path):
         os.killpg(process.pid, signal.SIGKILL)
     process.communicate()
     os.close(pipe)
+
+
+@pytest.fixture
+def manager(tmp_path, monkeypatch):
+    """The socket of a service manager, of which the run is told."""
+    path = tmp_path / "notify"
+    monkeypatch.setenv("NOTIFY_SOCKET", str(path))
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+        end.bind(str(path))
+        end.settimeout(30.0)
+        yield end
 
 
 def wait_for(process, words):
@@ -139,9 +151,18 @@ def test_a_request_to_end_that_reaches_every_process_settles_the_hand(service):
     assert process.wait() in (0, 5)
 
 
-def test_a_socket_on_a_network_would_be_found():
-    import socket
+def test_the_manager_waits_for_the_guard(manager, service):
+    """At the end no status comes any more: the watchdog of one second is prolonged."""
+    pipe, process = service
+    assert manager.recv(100) == b"READY=1\nWATCHDOG=1"
+    os.write(pipe, b"quit\n")
+    while b"WATCHDOG_USEC" not in (told := manager.recv(100)):
+        assert told == b"READY=1\nWATCHDOG=1"
+    assert told == b"WATCHDOG_USEC=%d\nWATCHDOG=1" % round(1e6 * LAST_S)
+    assert process.wait() == 0
 
+
+def test_a_socket_on_a_network_would_be_found():
     with socket.socket() as listener:
         listener.bind(("127.0.0.1", 0))
         listener.listen()

@@ -16,6 +16,9 @@ CHUNK, MESSAGE_INDEX, CHUNK_INDEX = 0x06, 0x07, 0x08
 STATISTICS, METADATA, METADATA_INDEX, DATA_END = 0x0B, 0x0C, 0x0D, 0x0F
 
 
+_INDEX_BYTES = 16  # of a message
+
+
 def text(value: str) -> bytes:
     """A string with its length in front."""
     data = value.encode("utf-8")
@@ -55,8 +58,8 @@ class McapWriter:
 
     @property
     def size(self) -> int:
-        """Bytes written so far."""
-        return self._offset + self._chunk_size
+        """Bytes written so far, with those of the chunk that waits and of its index."""
+        return self._offset + self._chunk_size + _INDEX_BYTES * len(self._times)
 
     def add_channel(
         self,

@@ -1,5 +1,6 @@
 import contextlib
 import json
+import resource
 import subprocess
 import sys
 from dataclasses import replace
@@ -201,6 +202,28 @@ def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
     assert process.wait(timeout=60) == 0
     assert process.stderr.read() == ""
     process.stderr.close()
+
+
+def _small_files():
+    resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
+
+
+def test_a_disk_that_takes_no_more_is_told_at_once(hand_model, marching_dir, tmp_path):
+    program = [sys.executable, "-m", "fingers_deploy", "run", str(marching_dir)]
+    program += ["--driver", "sim", "--model", str(hand_model), "--out", str(tmp_path)]
+    done = subprocess.run(
+        [*program, "--duration", "4"],
+        capture_output=True,
+        text=True,
+        stdin=subprocess.DEVNULL,
+        timeout=60,
+        check=False,
+        preexec_fn=_small_files,
+    )
+    before, told, _ = done.stdout.partition("NOT RECORDING: ")
+    assert told and "the run goes on" in done.stdout
+    assert "control steps" not in before  # that is the report at the end
+    assert done.returncode == 0 and done.stderr == ""
 
 
 def test_a_reader_that_goes_away_gets_no_traceback(bundle_dir):

@@ -177,6 +177,19 @@ def test_files_rotate_and_a_log_is_never_written_over(tmp_path, monkeypatch):
         _record(tmp_path, 1)
 
 
+def test_no_file_is_larger_than_50_mb(tmp_path):
+    """What is written after the last row, indices and summary, counts as well."""
+    recorder = Recorder(tmp_path, "run", JOINTS, {}, time.monotonic())
+    row = _random_row(np.random.default_rng(0), 0.0)
+    for k in range(30_000):
+        while recorder._queue.qsize() > 1000:
+            time.sleep(0.001)
+        recorder.row(0.02 * k, row)
+    recorder.close()
+    size = recorder.files[0].stat().st_size
+    assert recorder.dropped == 0 and 48e6 < size < 50e6
+
+
 def test_a_full_disk_is_told_and_stops_nothing(tmp_path, monkeypatch):
     recorder = Recorder(tmp_path, "run", JOINTS, {}, time.monotonic())
 
