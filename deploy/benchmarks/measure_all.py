@@ -11,6 +11,7 @@ on an idle machine only.
 """
 
 import argparse
+import json
 import os
 import subprocess
 import sys
@@ -18,8 +19,10 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from stamp import stamp
+
 HERE = Path(__file__).parent
-FAULTS, FIGURE = "faults", "disturbances"
+FAULTS, FIGURE, STAMPS = "faults", "disturbances", "measured.json"
 
 
 @dataclass(frozen=True)
@@ -89,11 +92,10 @@ def measure(part: Part, out: Path, small: bool) -> bool:
         print(f"{part.name}: there already", flush=True)
         return True
     script, *options = part.small if small else part.program
-    if not part.prints:
-        options += ["--out", str(out / part.name.split()[0])]
-    begin = time.monotonic()
+    target = [] if part.prints else ["--out", str(out / part.name.split()[0])]
+    begin, measured = time.monotonic(), stamp([script, *options])
     done = subprocess.run(
-        [sys.executable, str(HERE / script), *options],
+        [sys.executable, str(HERE / script), *options, *target],
         stdout=subprocess.PIPE,
         text=True,
         check=False,
@@ -104,7 +106,16 @@ def measure(part: Part, out: Path, small: bool) -> bool:
         return False
     if part.prints or faults:
         kept.write_text(done.stdout, "utf-8")
+    if not faults:  # those keep it with their results
+        stamps = read_stamps(out) | {part.name: measured}
+        (out / STAMPS).write_text(json.dumps(stamps, indent=1) + "\n", "utf-8")
     return True
+
+
+def read_stamps(out: Path) -> dict[str, dict]:
+    """When and how each part in a folder of results was measured."""
+    path = out / STAMPS
+    return json.loads(path.read_text("utf-8")) if path.exists() else {}
 
 
 def write_pages(out: Path, pages: Path) -> None:
