@@ -19,10 +19,13 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from fault_matrix import as_markdown
+from report import STAMPS, page, read_results
 from stamp import stamp
+from walking_quality import draw
 
 HERE = Path(__file__).parent
-FAULTS, FIGURE, STAMPS = "faults", "disturbances", "measured.json"
+FAULTS, FIGURE = "faults", "disturbances"
 
 
 @dataclass(frozen=True)
@@ -120,25 +123,15 @@ def read_stamps(out: Path) -> dict[str, dict]:
 
 def write_pages(out: Path, pages: Path) -> None:
     """Writes both pages and the figure from the results."""
-    wanted = ["step.json", "size.json", "fuzz.json", f"{FAULTS}.md", f"{FIGURE}.png"]
-    missing = [name for name in wanted if not (out / name).exists()]
+    parts = ["step", "size", "fuzz", FAULTS, FIGURE, "loop L1", "loop L2"]
+    missing = [name for name in parts if not (out / f"{name}.json").exists()]
     if missing:
         raise SystemExit(f"no pages: {', '.join(missing)} not measured yet")
-    loops = sorted(out.glob("loop *.json"))
-    files = ("--step", "step.json", "--size", "size.json", "--fuzz", "fuzz.json")
-    report = [
-        word if word.startswith("--") else str(out / word)
-        for word in (*files, "--loop")
-    ]
-    report += [f"{file.stem.removeprefix('loop ')}={file}" for file in loops]
-    target = str(pages / "deploy-results.md")
-    program = [sys.executable, str(HERE / "report.py"), *report, "--out", target]
-    subprocess.run(program, check=True)
-    (pages / "safety-table.md").write_bytes((out / f"{FAULTS}.md").read_bytes())
-    images = pages / "images"
-    images.mkdir(exist_ok=True)
-    picture = (out / f"{FIGURE}.png").read_bytes()
-    (images / f"deploy-{FIGURE}.png").write_bytes(picture)
+    results = read_results(out)
+    (pages / "deploy-results.md").write_text(page(results), "utf-8")
+    (pages / "safety-table.md").write_text(as_markdown(results.faults), "utf-8")
+    (pages / "images").mkdir(exist_ok=True)
+    draw(results.figure, pages / "images" / f"deploy-{FIGURE}.png")
 
 
 def main() -> int:

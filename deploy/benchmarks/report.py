@@ -1,18 +1,19 @@
 """One page from the results of the other measurements.
 
-`measure_all.py` calls it with what `step_time.py`, `loop_timing.py`, `install_size.py`
-and `fuzz_bundles.py` print:
+    python deploy/benchmarks/report.py --results OUT --out MD
 
-    python deploy/benchmarks/report.py --step S --loop L2=L … --size Z --fuzz F --out MD
+reads what `measure_all.py` left in a folder; `measure_all.py --pages` calls it.
 """
 
 import argparse
 import json
-import os
-import platform
 import sys
 from pathlib import Path
 
+from goals import Results, goals
+from stamp import sentence
+
+STAMPS = "measured.json"
 TIMING = {
     "row": "row",
     "minutes": "minutes",
@@ -49,6 +50,7 @@ host, which puts a core aside for up to 100 ms once both have been busy. A witne
 each core, a process of the highest priority that only sleeps, tells when (late by more
 than 4 ms); a missed step or a stop counts as one of a pause only if a pause overlaps
 it."""
+GOAL = ("what", "wanted", "measured", "met")
 STEP = ("runtime", "steps", "median_ms", "p999_ms", "worst_ms", "memory_growth_mb")
 SIZE = (
     "machine",
@@ -78,64 +80,84 @@ def _cell(value: object) -> str:
     return str(value)
 
 
-def page(step: list, loop: list, size: list, fuzz: dict) -> str:
+def page(results: Results) -> str:
     """The page."""
-    for row in size:
-        row["largest_mb"] = [f"{k} {v}" for k, v in list(row["largest_mb"].items())[:3]]
+    when = {name: sentence(stamp) for name, stamp in results.stamps.items()}
+    loops = [{"row": name, **row} for name, row in results.loops.items()]
+    fuzz = results.fuzz
     parts = (
         "# The robot's side, measured",
-        f"Written by `python deploy/benchmarks/report.py` on {platform.machine()}, "
-        f"{os.cpu_count()} cores, Python {platform.python_version()}, with the "
-        "committed crawl policy; `busy cores` tells what else ran meanwhile (the loop "
-        "and its simulated hand take half of one). Not on the robot's computer.",
+        "Written by `python deploy/benchmarks/report.py` from the results that "
+        "`measure_all.py` keeps in `deploy/benchmarks/results`, with the committed "
+        "crawl policy. Nothing here ran on the robot's computer.",
+        "## What it must show",
+        table([goal.row() for goal in goals(results)], GOAL),
+        "The faults, row by row: [safety-table.md](safety-table.md).",
         "## A control step: observation, network, action, supervisor",
-        "`step_time.py`. Wanted: median at most 0.5 ms, 99.9 % within 2 ms, memory "
-        "flat within 1 MB, over 30 minutes' worth of steps.",
-        table(step, STEP),
+        when["step"],
+        table(results.step, STEP),
         "## The loop in real time, against a simulated hand in another process",
-        "`loop_timing.py`. The hand walks all the time; a control step is missed if "
-        "it ends more than 5 ms after its deadline or is skipped. Wanted under load "
-        "(L2): at most 0.1 % missed. Without real-time priority (L3) it may miss, but "
-        "must say so and hold. `hogs` are busy processes besides; `busy cores` counts "
-        "everything. L4 is the gaps of the 500 Hz loop, L5 the long run.",
-        table(loop, TIMING),
+        "The hand walks all the time; a control step is missed if it ends more than "
+        "5 ms after its deadline or is skipped. Without real-time priority (L3) it may "
+        "miss, but must say so and hold. `hogs` are busy processes besides; "
+        "`busy cores` counts everything (the loop and its simulated hand take half of "
+        "one). L4 is the gaps of the 500 Hz loop, L5 the long run.",
+        table(loops, TIMING),
         PAUSES,
-        table(loop, OUTCOME),
+        table(loops, OUTCOME),
         "A stop is the supervisor's, with its reasons; the operator armed again at "
         "once.",
+        "\n".join(f"- {name}: {when[f'loop {name}']}" for name in results.loops),
         "## Installed size and import",
-        "`install_size.py`. Wanted: at most 40 MB with NumPy alone, 120 MB with ONNX "
-        "Runtime (10⁶ bytes, nothing removed, without the byte code that Python writes "
-        "at the first use); import within 0.5 s of processor time. The package is "
-        "0.3 MB. NumPy's wheel alone is above the first limit, most of it a copy of "
-        "OpenBLAS; the NumPy of Debian (and of Raspberry Pi OS, which is made of it) "
-        "shares a small BLAS with the system.",
-        table(size, SIZE),
+        "10⁶ bytes, nothing removed, without the byte code that Python writes at the "
+        "first use; import in processor time. NumPy's wheel alone is above the limit "
+        "of 40 MB, most of it a copy of OpenBLAS; the NumPy of Debian (and of "
+        "Raspberry Pi OS, which is made of it) shares a small BLAS with the system.",
+        when["size"],
+        table([_largest(row) for row in results.size], SIZE),
         "## Damaged bundles",
-        f"`fuzz_bundles.py`. {fuzz['damaged']} bundles with flipped bits, changed, "
-        f"cut, inserted and swapped bytes and edited manifests (seed {fuzz['seed']}): "
-        f"{fuzz['accepted']} accepted, {fuzz['not_one_line']} not refused in one line "
-        f"with status 2. Of {fuzz['control']} policies with one flipped bit, ONNX "
-        f"Runtime alone loads {fuzz['control_loaded']}.",
+        f"{fuzz['damaged']} bundles with flipped bits, changed, cut, inserted and "
+        f"swapped bytes and edited manifests: {fuzz['accepted']} accepted, "
+        f"{fuzz['not_one_line']} not refused in one line with status 2. Of "
+        f"{fuzz['control']} policies with one flipped bit, ONNX Runtime alone loads "
+        f"{fuzz['control_loaded']}.",
+        when["fuzz"],
+        "## Walking under disturbances",
+        "The figure is in [deploy.md](deploy.md). " + when["disturbances"],
     )
     return "\n\n".join(parts) + "\n"
+
+
+def _largest(row: dict) -> dict:
+    largest = list(row["largest_mb"].items())[:3]
+    return row | {"largest_mb": [f"{name} {size}" for name, size in largest]}
+
+
+def read_results(folder: Path) -> Results:
+    """Reads what `measure_all.py` left in a folder."""
+
+    def read(name: str):
+        return json.loads((folder / f"{name}.json").read_text("utf-8"))
+
+    loops = sorted(folder.glob("loop *.json"))
+    return Results(
+        step=read("step"),
+        size=read("size"),
+        fuzz=read("fuzz"),
+        loops={file.stem.removeprefix("loop "): read(file.stem) for file in loops},
+        faults=read("faults"),
+        figure=read("disturbances"),
+        stamps=json.loads((folder / STAMPS).read_text("utf-8")),
+    )
 
 
 def main() -> int:
     """Writes the page."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--step", type=Path, required=True)
-    parser.add_argument("--loop", metavar="ROW=FILE", nargs="+", required=True)
-    parser.add_argument("--size", type=Path, required=True)
-    parser.add_argument("--fuzz", type=Path, required=True)
+    parser.add_argument("--results", type=Path, required=True, help="folder")
     parser.add_argument("--out", type=Path, required=True)
     options = parser.parse_args()
-    read = [json.loads(path.read_text()) for path in (options.step, options.size)]
-    loop = []
-    for name, _, path in (word.partition("=") for word in options.loop):
-        loop.append({"row": name, **json.loads(Path(path).read_text())})
-    fuzz = json.loads(options.fuzz.read_text())
-    options.out.write_text(page(read[0], loop, read[1], fuzz), "utf-8")
+    options.out.write_text(page(read_results(options.results)), "utf-8")
     return 0
 
 
