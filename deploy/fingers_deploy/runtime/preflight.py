@@ -83,7 +83,7 @@ def _fresh(
 ) -> Check:
     if sample is None:
         return Check(f"{name} fresh", False, "nothing yet")
-    age_s = t - sample.t_s
+    age_s = max(t - sample.t_s, 0.0)  # it may have come after the deadline
     return Check(f"{name} fresh", age_s <= limit_s, f"{1e3 * age_s:.0f} ms old")
 
 

@@ -28,11 +28,16 @@ class Timing:
         return int(self._counts.sum())
 
     def quantile(self, share: float) -> float:
-        """Upper edge of the bin in which the share is reached [s]; NaN if empty."""
+        """Upper edge of the bin in which the share is reached [s]; NaN if empty.
+
+        No more than the worst case, which is also the edge of the last bin.
+        """
         total = self._counts.cumsum()
         if not total[-1]:
             return float("nan")
-        return float(np.searchsorted(total, share * total[-1]) + 1) * _BIN_S
+        place = int(np.searchsorted(total, share * total[-1]))
+        edge_s = np.inf if place == _BINS else (place + 1) * _BIN_S
+        return float(min(edge_s, self.worst_s))
 
     def above(self, limit_s: float) -> int:
         """How many durations were longer than a multiple of 0.1 ms."""

@@ -96,7 +96,8 @@ class Supervisor:
                 per_control,
                 time.monotonic,
                 self._recorder,
-                tuple(options["wiggle"]),
+                # Nothing follows in a dry run, so that there is nothing to compare.
+                () if dry else tuple(options["wiggle"]),
             )
         except BaseException:
             self._driver.close()

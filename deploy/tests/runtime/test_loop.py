@@ -83,9 +83,11 @@ def test_timing_quantiles_and_counts():
         assert timing.quantile(share) == pytest.approx(
             np.quantile(values, share), abs=2e-4
         )
+    assert timing.quantile(1.0) == values.max()
     assert timing.above(0.005) == (values >= 0.005).sum()
     assert timing.worst_s == values.max() and timing.count == 5000
     timing.add(7.0)
+    assert timing.quantile(0.9999) == 7.0  # beyond the last bin
     timing.add(-1.0)
     assert timing.worst_s == 7.0 and timing.count == 5002
 
