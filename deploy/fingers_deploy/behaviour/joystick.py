@@ -17,12 +17,14 @@ class Joystick:
 
     The kernel reports changes only. A gamepad that is unplugged makes reading fail; a
     radio link that dies silently does not. So a stick that is held out without the
-    slightest change for two seconds counts as lost, until it changes again.
+    slightest change for a while counts as lost, until it changes again.
 
     Args:
         path: the device, e.g. `/dev/input/js0`.
         axes: for each entry of the command, the axis and the sign that it is read with.
         deadman: number of the dead-man button.
+        quiet_s: how long a stick may be held out without a change [s]; infinite for a
+            gamepad whose receiver goes away with the link.
 
     Raises:
         InputError: the device cannot be opened.
@@ -33,12 +35,13 @@ class Joystick:
         path: str = "/dev/input/js0",
         axes: tuple[tuple[int, float], ...] = ((1, -1.0), (0, -1.0), (3, -1.0)),
         deadman: int = 4,
+        quiet_s: float = QUIET_S,
     ):
         try:
             self._file = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
         except OSError as error:
             raise InputError(path, "", error.strerror, "a gamepad") from error
-        self._map, self._deadman = axes, deadman
+        self._map, self._deadman, self._quiet_s = axes, deadman, quiet_s
         self._axes: dict[int, float] = {}
         self._buttons: dict[int, bool] = {}
         self._changed_s: float | None = None
@@ -52,7 +55,7 @@ class Joystick:
         held = any(abs(stick) > 0.1 for stick in sticks)
         if self._changed_s is None:
             self._changed_s = t
-        if held and t - self._changed_s > QUIET_S:
+        if held and t - self._changed_s > self._quiet_s:
             return self._frame
         self._frame = Frame(t, sticks, self._buttons.get(self._deadman, False))
         return self._frame

@@ -32,6 +32,9 @@ def check_options(options: argparse.Namespace) -> None:
     hold = options.heading_hold or ()
     if not all(map(math.isfinite, hold)):
         raise InputError("--heading-hold", "", hold, "finite numbers")
+    if not options.joystick_quiet >= 0:
+        valid = "0 s (never) or more"
+        raise InputError("--joystick-quiet", "", options.joystick_quiet, valid)
     if options.duration is not None and not options.duration > 0:
         raise InputError("--duration", "", options.duration, "above 0 s")
     if not options.no_record and not Path(options.out).is_dir():

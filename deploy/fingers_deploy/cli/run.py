@@ -5,6 +5,7 @@ import contextlib
 import math
 from typing import Any
 
+from fingers_deploy.behaviour.joystick import QUIET_S
 from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.cli.console import REFUSED, drive
@@ -28,6 +29,14 @@ def add_run(commands: Any) -> None:
         "--runtime", choices=("auto", "onnxruntime", "numpy"), default="auto"
     )
     parser.add_argument("--joystick", metavar="DEVICE", help="e.g. /dev/input/js0")
+    parser.add_argument(
+        "--joystick-quiet",
+        type=float,
+        default=QUIET_S,
+        metavar="S",
+        help="a stick held out so long without the slightest change counts as a lost "
+        "gamepad (2); 0: never, where the device goes away with the radio link",
+    )
     parser.add_argument(
         "--sticks", type=float, nargs="*", default=[], help="fixed sticks, −1 to 1"
     )
@@ -63,6 +72,7 @@ def add_record(commands: Any) -> None:
         command=run,
         runtime="numpy",
         joystick=None,
+        joystick_quiet=QUIET_S,
         sticks=[],
         heading_hold=None,
         keys=None,
@@ -104,6 +114,7 @@ def run(options: argparse.Namespace) -> int:
             "wiggle": WIGGLES[options.wiggle],
             "runtime": options.runtime,
             "joystick": options.joystick,
+            "joystick_quiet_s": options.joystick_quiet,
             "sticks": options.sticks,
             "plan": options.plan,
             "keys": options.keys,

@@ -35,9 +35,10 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
 
     Args:
         options: `bundles` (paths), `runtime`, `sticks` (fixed positions) or `joystick`
-            (device), `heading_hold` (gain and offset) or None; `keys` (names),
-            `keyboard` (device) and `tracker` (path of a socket) or None; `plan` (file
-            of targets that are played in the place of a policy) or None.
+            (device) with `joystick_quiet_s` (0: for ever), `heading_hold` (gain and
+            offset) or None; `keys` (names), `keyboard` (device) and `tracker` (path of
+            a socket) or None; `plan` (file of targets that are played in the place of a
+            policy) or None.
 
     Raises:
         InputError: a bundle or a device is refused.
@@ -51,7 +52,8 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
     )
     source: CommandSource
     if options.get("joystick"):
-        source = Joystick(options["joystick"])
+        quiet_s = options["joystick_quiet_s"] or float("inf")
+        source = Joystick(options["joystick"], quiet_s=quiet_s)
     else:
         source = FixedCommand(tuple(options.get("sticks") or ()))
     interfaces = [c.bundle.manifest.interface for c in controllers]

@@ -145,6 +145,13 @@ def test_a_stick_held_out_without_any_change_grows_old_until_it_moves(pad):
     stick.close()
 
 
+def test_a_receiver_that_goes_away_with_the_link_needs_no_movement(pad):
+    stick = pad.open(quiet_s=float("inf"))
+    pad.event(32767, 0x02, 0)
+    assert [stick.poll(t).t_s for t in (1.0, 60.0)] == [1.0, 60.0]
+    stick.close()
+
+
 def test_a_missing_joystick_is_refused(tmp_path):
     with pytest.raises(InputError, match="gamepad"):
         Joystick(str(tmp_path / "none"))

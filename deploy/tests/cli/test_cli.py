@@ -55,6 +55,7 @@ SIM = ("--driver", "sim", "--model", "x")
         (["run", "BUNDLE", *SIM, "--sticks", "5"], "from -1 to 1"),
         (["run", "BUNDLE", *SIM, "--heading-hold", "inf", "0"], "finite"),
         (["run", "BUNDLE", *SIM, "--duration", "-1"], "above 0"),
+        (["run", "BUNDLE", *SIM, "--joystick-quiet", "nan"], "or more"),
         (["run", "BUNDLE", *SIM, "--out", "nowhere"], "existing folder"),
         (["run", "BUNDLE", *SIM, "--keys", "up"], "a keyboard policy"),
         (["run", "BUNDLE", *SIM, "--keyboard", "/dev/none"], "a keyboard policy"),
