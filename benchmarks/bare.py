@@ -5,6 +5,7 @@ Every world stands in the stance with its joint targets held.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import mujoco
@@ -74,6 +75,13 @@ def bare_warp(env: HandEnv, worlds: int) -> Layer:
     return Layer(call, repeat, note)
 
 
+def _replay(graph: Any, kept: object) -> None:
+    import warp as wp  # pyright: ignore[reportMissingImports]
+
+    del kept
+    wp.capture_launch(graph)
+
+
 def _recorded(step: Callable[[], None], model: Any) -> tuple[Callable[[], None], str]:
     """Returns the fastest way to repeat `step` that works here, and which one it is.
 
@@ -94,6 +102,7 @@ def _recorded(step: Callable[[], None], model: Any) -> tuple[Callable[[], None],
         except RuntimeError as error:
             failures += f"; no {kind}: {' '.join(str(error).split())}"
         else:
-            return lambda: wp.capture_launch(capture.graph), kind + failures
+            # The graph does not keep the buffers alive that it works on; `step` does.
+            return partial(_replay, capture.graph, step), kind + failures
     model.opt.graph_conditional = True
     return step, "kernels launched one by one" + failures
