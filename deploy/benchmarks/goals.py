@@ -24,7 +24,8 @@ class Results:
     """Everything that was measured, as the scripts print it.
 
     Attributes:
-        step, size, fuzz: of `step_time`, `install_size`, `fuzz_bundles`.
+        step, size, fuzz, tasks: of `step_time`, `install_size`, `fuzz_bundles`,
+            `task_runs`.
         loops: of `loop_timing`, by name of the row.
         faults: of `fault_matrix`.
         figure: of `walking_quality`.
@@ -34,6 +35,7 @@ class Results:
     step: list[dict]
     size: list[dict]
     fuzz: dict
+    tasks: dict[str, list[dict]]
     loops: Mapping[str, dict]
     faults: dict
     figure: dict[str, list[dict]]

@@ -72,6 +72,9 @@ PARTS = (
     _faults("links", ("--loss-s", "600"), ("--loss-s", "2")),
     _faults("fault_free", ("--hours", "1"), ("--hours", "0.003")),
     Part(
+        "tasks", ("task_runs.py", "--trials", "10"), ("task_runs.py", "--trials", "1")
+    ),
+    Part(
         FIGURE,
         ("walking_quality.py",),
         ("walking_quality.py", "--seconds", "1", "--trials", "1"),
@@ -124,7 +127,7 @@ def read_stamps(out: Path) -> dict[str, dict]:
 
 def write_pages(out: Path, pages: Path) -> None:
     """Writes both pages and the figure from the results."""
-    parts = ["step", "size", "fuzz", FAULTS, FIGURE, "loop L1", "loop L2"]
+    parts = ["step", "size", "fuzz", "tasks", FAULTS, FIGURE, "loop L1", "loop L2"]
     missing = [name for name in parts if not (out / f"{name}.json").exists()]
     if missing:
         raise SystemExit(f"no pages: {', '.join(missing)} not measured yet")

@@ -10,6 +10,7 @@ import json
 import sys
 from pathlib import Path
 
+import numpy as np
 from goals import Results, goals
 from stamp import sentence
 
@@ -122,6 +123,11 @@ def page(results: Results) -> str:
         f"{fuzz['control']} policies with one flipped bit, ONNX Runtime alone loads "
         f"{fuzz['control_loaded']}.",
         when["fuzz"],
+        "## Typing, pushing and stopping under the supervisor",
+        "The scenes and the committed policies are those of training; keys are asked "
+        "for one by one, a cube is to come within 2 cm of its target.",
+        when["tasks"],
+        table(_tasks(results.tasks), ("task", "trials", "result", "stopped by")),
         "## Walking under disturbances",
         "The figure is in [deploy.md](deploy.md). " + when["disturbances"],
     )
@@ -131,6 +137,29 @@ def page(results: Results) -> str:
 def _largest(row: dict) -> dict:
     largest = list(row["largest_mb"].items())[:3]
     return row | {"largest_mb": [f"{name} {size}" for name, size in largest]}
+
+
+def _tasks(tasks: dict[str, list[dict]]) -> list[dict]:
+    rows = []
+    for name, runs in tasks.items():
+        faults = sorted({fault for run in runs for fault in run.get("faults", ())})
+        trials, result = len(runs), ""
+        if "keys" in runs[0]:
+            latency = np.median([x for run in runs for x in run["latency_s"]])
+            hits, keys = (sum(run[k] for run in runs) for k in ("correct", "keys"))
+            result = f"{hits} of {keys} keys, {latency:.2f} s after the request"
+        elif "delivered" in runs[0]:
+            result = f"{sum(run['delivered'] for run in runs)} delivered"
+        else:
+            trials = sum(run["stops"] for run in runs)
+            result = "; ".join(
+                f"{run['falls']} of {run['stops']} fell, {run['wait_s']:g} s after the "
+                "last command"
+                for run in runs
+            )
+        row = {"task": name, "trials": trials, "result": result}
+        rows.append(row | {"stopped by": ", ".join(faults)})
+    return rows
 
 
 def read_results(folder: Path) -> Results:
@@ -144,6 +173,7 @@ def read_results(folder: Path) -> Results:
         step=read("step"),
         size=read("size"),
         fuzz=read("fuzz"),
+        tasks=read("tasks"),
         loops={file.stem.removeprefix("loop "): read(file.stem) for file in loops},
         faults=read("faults"),
         figure=read("disturbances"),

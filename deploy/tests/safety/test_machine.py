@@ -141,8 +141,7 @@ def test_the_transition_table_never_arms_by_itself(pair):
 FAULTS = [None, *BOOLEANS]
 
 
-@settings(max_examples=80, deadline=None)
-@given(
+SEQUENCES = given(
     script=st.lists(
         st.tuples(
             st.sampled_from(FAULTS),
@@ -153,7 +152,23 @@ FAULTS = [None, *BOOLEANS]
     ),
     start_active=st.booleans(),
 )
+
+
+@settings(max_examples=80, deadline=None)
+@SEQUENCES
 def test_property_what_holds_in_any_sequence(make_rig, script, start_active):
+    _play(make_rig, script, start_active)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+@settings(max_examples=5000, deadline=None)
+@SEQUENCES
+def test_property_what_holds_in_many_sequences(make_rig, script, start_active):
+    _play(make_rig, script, start_active)
+
+
+def _play(make_rig, script, start_active):
     rig = make_rig(settle_s=0.1)
     if start_active:
         rig.activate()
