@@ -10,6 +10,8 @@ import numpy as np
 from fingers_deploy.errors import InputError
 from fingers_deploy.record.log import Log, read_log
 
+_WIDEST = 100
+
 
 def add_log(commands: Any) -> None:
     """Adds the command."""
@@ -27,8 +29,8 @@ def show(options: argparse.Namespace) -> int:
     print(f"{log.source}: {len(rows)} rows, {length_s:.1f} s")
     if not log.complete:
         print("the recording was cut off: it ends with its last whole second")
-    for name, value in log.metadata.items():
-        print(f"  {name:15} {value[:100]}")
+    for name, value in (log.metadata | log.summary).items():
+        print(f"  {name:15} {value[:_WIDEST]}{'…' * (len(value) > _WIDEST)}")
     for t_s, line in log.events:
         print(f"  {t_s:9.3f} s  {line}")
     if options.csv:

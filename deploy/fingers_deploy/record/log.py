@@ -1,6 +1,6 @@
 """A log as named columns, for identification and for replay."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +17,7 @@ from fingers_deploy.record.row import (
 )
 
 EVENTS_TOPIC = "/fingers/events"
-METADATA = "fingers_log"
+METADATA, SUMMARY = "fingers_log", "fingers_summary"
 PER_JOINT = ("cmd", "pos", "cur", "temp")
 _AXES = ("x", "y", "z")
 
@@ -33,6 +33,7 @@ class Log:
         events: time since the start [s] and text of each event.
         metadata: what was recorded about the run.
         complete: the file was closed; false after a crash.
+        summary: timing of the whole run, in the last file of a run that has ended.
     """
 
     source: str
@@ -41,6 +42,7 @@ class Log:
     events: tuple[tuple[float, str], ...]
     metadata: dict[str, str]
     complete: bool
+    summary: dict[str, str] = field(default_factory=dict)
 
     def columns(self) -> dict[str, NDArray]:
         """Columns `t`, `cmd.<joint>`, `pos.<joint>`, `cur.<joint>`, `gyro.x`, ….
@@ -94,6 +96,7 @@ def read_log(path: str | Path) -> Log:
         events=tuple((when - start, line) for when, line in events),
         metadata=metadata,
         complete=found.complete,
+        summary=found.metadata.get(SUMMARY, {}),
     )
 
 

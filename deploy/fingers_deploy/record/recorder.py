@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.record.log import EVENTS_TOPIC, METADATA, encode_string
+from fingers_deploy.record.log import EVENTS_TOPIC, METADATA, SUMMARY, encode_string
 from fingers_deploy.record.mcap_write import McapWriter
 from fingers_deploy.record.ros import (
     COMMANDS_TOPIC,
@@ -156,5 +156,5 @@ class Recorder:
                 self._writer.close()
                 self._writer = self._open()
         self._writer.flush()
-        self._writer.add_metadata("fingers_summary", self._summary)
+        self._writer.add_metadata(SUMMARY, self._summary)
         self._writer.close()

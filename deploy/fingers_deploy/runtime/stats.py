@@ -39,6 +39,11 @@ class Timing:
         edge_s = np.inf if place == _BINS else (place + 1) * _BIN_S
         return float(min(edge_s, self.worst_s))
 
+    def histogram(self) -> str:
+        """Counts of the bins that are not empty, as `lower edge [ms]: count, …`."""
+        used = np.flatnonzero(self._counts).tolist()
+        return ", ".join(f"{1e3 * _BIN_S * k:.1f}: {self._counts[k]}" for k in used)
+
     def above(self, limit_s: float) -> int:
         """How many durations were longer than a multiple of 0.1 ms."""
         return int(self._counts[round(limit_s / _BIN_S) :].sum())
@@ -99,3 +104,8 @@ class LoopStats:
             "answer_p999_ms": 1e3 * self.answer.quantile(0.999),
             "answer_max_ms": 1e3 * self.answer.worst_s,
         }
+
+    def histograms(self) -> dict[str, str]:
+        """Histograms for the log, in bins of 0.1 ms, the last for 100 ms and more."""
+        timings = {"late": self.late, "gap": self.gap, "answer": self.answer}
+        return {f"{name}_histogram": x.histogram() for name, x in timings.items()}

@@ -140,8 +140,14 @@ class Supervisor:
     def _close(self, realtime: str) -> None:
         self._driver.close()
         if self._recorder is not None:
-            numbers = {k: repr(v) for k, v in self._core.stats.summary().items()}
-            self._recorder.close({"realtime": realtime, **numbers})
+            stats = self._core.stats
+            numbers = {
+                k: f"{v:.4g}" if isinstance(v, float) else str(v)
+                for k, v in stats.summary().items()
+            }
+            self._recorder.close(
+                {"realtime": realtime, **numbers, **stats.histograms()}
+            )
 
     def _status(
         self, realtime: str, events: Sequence[str], alarm: bool

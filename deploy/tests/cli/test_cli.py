@@ -131,6 +131,20 @@ def test_a_run_from_the_command_line(recorded):
     assert (log.rows["mode"] == Mode.ACTIVE).any()
 
 
+def test_a_recording_keeps_the_timing_of_its_run(recorded, capsys):
+    _, file = recorded
+    log = read_log(file)
+    counts = [
+        int(entry.partition(":")[2])
+        for entry in log.summary["late_histogram"].split(", ")
+    ]
+    assert sum(counts) == int(log.summary["control_steps"]) == len(log.rows)
+    assert main(["log", str(file)]) == 0
+    said = capsys.readouterr().out
+    for name in ("late_p999_ms", "skipped", "gap_max_ms", "realtime"):
+        assert f"  {name:15} {log.summary[name]}\n" in said
+
+
 def test_a_recording_converts_to_csv(recorded, tmp_path, capsys):
     _, file = recorded
     out = tmp_path / "run.csv"

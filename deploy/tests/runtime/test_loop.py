@@ -92,6 +92,15 @@ def test_timing_quantiles_and_counts():
     assert timing.worst_s == 7.0 and timing.count == 5002
 
 
+def test_histograms_are_told_without_their_empty_bins():
+    stats = LoopStats()
+    for late_s in (0.00025, 0.00021, 0.0071, 3.0):
+        stats.step(late_s, 0, late_s)
+    told = stats.histograms()
+    assert told["late_histogram"] == "0.2: 2, 7.1: 1, 100.0: 1"
+    assert told["gap_histogram"] == told["answer_histogram"] == ""
+
+
 def test_more_than_one_percent_of_late_steps_warns():
     stats = LoopStats()
     for k in range(1000):
