@@ -33,15 +33,20 @@ Params = dict[str, dict[str, Float[Array, " c"]]]
 
 
 def command_path(
-    held: Float[Array, "t s p"], share: Float[Array, "t s p"], params: Params, dt: float
-) -> Float[Array, "t p c"]:
+    held: Float[Array, "t s p"], sent: Float[Array, "t s p"], params: Params, dt: float
+) -> tuple[Float[Array, "t p c"], Float[Array, "t p c"]]:
     """Returns the commands of candidates c at the steps of the grid [rad or m].
 
     Args:
-        held: targets that were held during the step that ends here, in their order.
-        share: for which shares of the step.
+        held: the last targets before the end of every step, in their order.
+        sent: when they were sent before that end, negative [steps].
         params: values of the parameters by effect; effects may be missing.
         dt: step of the grid [s].
+
+    Returns:
+        The commands, and their ripple: the mean about a step less what a smooth curve
+        through the commands at the steps would have there. A servo that is read as
+        often as targets come is always met at the same place of their saw.
     """
     given = {name: value for name, value in params.items() if name in EFFECTS}
     count = next(x for v in params.values() for x in v.values()).shape[0]
@@ -52,25 +57,45 @@ def command_path(
     grid = value("command_quantization", "step_rad", 0.0)
     cutoff = value("lowpass_cutoff", "cutoff_hz", jnp.inf)
     speed = value("slew_limit", "speed_rad_s", jnp.inf)
+    age = value("transport_delay", "delay_s", 0.0)
+    age = (age + value("sensor_latency", "latency_s", 0.0)) / dt
+    whole = jnp.floor(age)
+    lag_s = 1.0 / (2.0 * jnp.pi * cutoff)
 
     def step(carry, row):
         smooth, command = carry
-        for target, part in zip(*row, strict=True):
+        targets, times = row
+        begin = jnp.clip(times[..., None] + (age - whole) + 1.0, 0.0, 1.0)
+        begin = begin.at[0].set(0.0)
+        parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
+        total = jnp.zeros_like(command)
+        for target, part in zip(targets, parts, strict=True):
             # No time at all would make 0 × ∞ of an absent limit.
-            h = jnp.maximum(part, 1e-6)[:, None] * dt
-            last = smooth
-            smooth = filtered(last, quantized(target[:, None], grid), cutoff, h)
+            h = jnp.maximum(part, 1e-6) * dt
+            last, before = smooth, command
+            goal = quantized(target[:, None], grid)
+            smooth = filtered(last, goal, cutoff, h)
             command = _pursuit(command, last, smooth, speed, h)
-        return (smooth, command), command
+            follows = (before == last) & (command == smooth)
+            mean = goal - (smooth - last) * lag_s / h
+            total += part * jnp.where(follows, mean, 0.5 * (before + command))
+        return (smooth, command), (command, total)
 
     first = quantized(held[0, 0][:, None], grid)
     first = jnp.broadcast_to(first, (held.shape[2], count))
-    path = jax.lax.scan(step, (first, first), (held, share))[1]
-    age = value("transport_delay", "delay_s", 0.0)
-    age = age + value("sensor_latency", "latency_s", 0.0)
+    path, mean = jax.lax.scan(step, (first, first), (held, sent))[1]
     t_s = dt * jnp.arange(len(held))[:, None]
     drift = 1e-6 * value("clock_drift", "drift_ppm", 0.0)
-    return _late(path, (age + drift * t_s) / dt)
+    steps = whole + drift * t_s / dt
+    return _late(path, steps), _late(_ripple(path, mean), steps)
+
+
+def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):
+    """Returns the means of the steps around, less those of cubics through the path."""
+    wide = jnp.pad(path, [(2, 1), (0, 0), (0, 0)], "edge")
+    sides, middle = wide[:-3] + wide[3:], wide[1:-2] + wide[2:-1]
+    rest = mean - (13.0 * middle - sides) / 24.0
+    return 0.5 * (rest + jnp.concatenate([rest[1:], rest[-1:]]))
 
 
 def _pursuit(command, last, goal, speed, h):

@@ -30,7 +30,7 @@ from envs.hand.effects.chain import chain_step, init_states
 from envs.hand.effects.surroundings import Gravity, Surroundings
 from sysid import diagnose_command as command
 from sysid import diagnose_link as link
-from sysid.diagnose_records import SMOOTH_STEPS
+from sysid.diagnose_grid import SMOOTH_STEPS
 
 BAND_STEPS = 2.2
 """Width of the Gaussian through which both residuals pass [steps of the grid]."""
@@ -52,7 +52,7 @@ class Track:
 
     Attributes:
         cmd, pos, vel, acc, jerk: target, encoder angle and its derivatives.
-        held, share: see `Piece`.
+        held, sent: see `Piece`.
         slow_vel: speed that passed the band of the residuals, for friction.
         effort: measured torque of the drive [N·m]; zero where it is not logged.
         push: torque of all that is neither drive nor gravity [N·m].
@@ -65,12 +65,13 @@ class Track:
         others_nm, other_q, other_nm: what the neighbours do.
         kp, kd: nominal gains by piece.
         measured: 1 where the logged effort enters the gears, else 0 (p).
+        between: 1 where the command's ripple hides between the readings, else 0.
         noise: noise of angle, its two derivatives and effort in the residuals' band.
     """
 
     cmd: Float[Array, "t p"]
     held: Float[Array, "t s p"]
-    share: Float[Array, "t s p"]
+    sent: Float[Array, "t s p"]
     pos: Float[Array, "t p"]
     vel: Float[Array, "t p"]
     acc: Float[Array, "t p"]
@@ -93,6 +94,7 @@ class Track:
     kp: Float[Array, " p"]
     kd: Float[Array, " p"]
     measured: Float[Array, " p"]
+    between: Float[Array, ""]
     noise: Float[Array, "4"]
 
 
@@ -101,8 +103,8 @@ _STEPWISE = tuple(
     for f in dataclasses.fields(Track)
     if f.name
     not in (
-        *("cmd", "held", "share"),
-        *("gravity", "payload_kg", "kp", "kd", "measured", "noise"),
+        *("cmd", "held", "sent"),
+        *("gravity", "payload_kg", "kp", "kd", "measured", "between", "noise"),
     )
 )
 
@@ -129,7 +131,7 @@ def _slow(params, state, x, dt):
 def _enter(params, state, x, dt):
     """Remembers the servo's torque and lets the measured one enter the gears."""
     mixed = x.torque + params["measured"] * (params["effort"] - x.torque)
-    return x.torque, x.replace(torque=mixed)
+    return x.torque, x.replace(torque=mixed + x.follows * x.kp * params["ripple"])
 
 
 def _read(params, state, x, dt):
@@ -186,7 +188,8 @@ def forced_residuals(
         dt: step of the grid [s].
         names: effects in the order of the chain.
     """
-    path = command.command_path(track.held, track.share, params, dt)
+    path, ripple = command.command_path(track.held, track.sent, params, dt)
+    ripple = track.between * ripple
     wide = {
         n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in _RIGID
     }
@@ -194,9 +197,10 @@ def forced_residuals(
     gain, mass, skew, hold, pushed, rotor = (nuisance[k][None, :] for k in figures)
     gap, soft, rotor = _between(params, rotor)
 
-    def model(now):
+    def model(now, ripple):
         effort = gain * now["effort"]
-        enter = {"effort": effort, "measured": track.measured[:, None]}
+        measured = track.measured[:, None]
+        enter = {"effort": effort, "measured": measured, "ripple": ripple}
         slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
         body = tuple((_RIGID[n], p) for n, p in wide.items())
         angle = now["pos"] + skew * now["vel"]
@@ -205,7 +209,7 @@ def forced_residuals(
 
     def step(carry, row):
         states, shift, shift_speed, steep, behind = carry
-        row, target = row
+        row, target, ripple = row
         now = {k: v[:, None] for k, v in row.items()}
         q = now["pos"] + skew * now["vel"] - shift
         qd = now["vel"] + skew * now["acc"] - shift_speed
@@ -229,7 +233,7 @@ def forced_residuals(
         )
         kp, kd = track.kp[:, None], track.kd[:, None]
         states, x = chain_step(
-            model(now), states, target, q, qd, load, kp, kd, dt, around
+            model(now, ripple), states, target, q, qd, load, kp, kd, dt, around
         )
         inertia = mass * now["inertia"] + x.inertia
         loud, usual = _loudness(track, now, x, gain, inertia / steep)
@@ -259,9 +263,9 @@ def forced_residuals(
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
     none = jnp.zeros_like(q0)
-    states = init_states(model(first), path[0], q0, dt)
+    states = init_states(model(first, ripple[0]), path[0], q0, dt)
     start = (states, none, none, none + 1.0, (none, none))
-    out = jax.lax.scan(step, start, (rows, path))[1]
+    out = jax.lax.scan(step, start, (rows, path, ripple))[1]
     return _filtered(
         out | {"command": path}, track.slow_vel[:, :, None], friction_speed
     )

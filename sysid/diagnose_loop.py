@@ -64,7 +64,7 @@ def _closed_loop(
     names: tuple[str, ...],
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side."""
-    path = command_path(track.held, track.share, params, dt * substeps)
+    path = command_path(track.held, track.sent, params, dt * substeps)[0]
     model = tuple(
         (KINDS[n], {k: v[None, :] for k, v in params[n].items()})
         for n in names

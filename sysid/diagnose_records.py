@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from envs.errors import InputError
 from sysid.data import MeasuredLog
 from sysid.data_timing import column_timing, continuous_parts
+from sysid.diagnose_grid import SMOOTH_STEPS, held_targets, shares, smoothed
 
 GRID_S = 0.004
 """Step that a grid does not go much below [s]; slower logs keep their own."""
@@ -28,9 +29,6 @@ FORGOTTEN_S = 0.25
 MIN_PIECE_S = 1.5
 """Shorter pieces of a record are left out [s]."""
 
-SMOOTH_STEPS = 0.8
-"""Width of the smoothing of all channels [steps of the grid]."""
-
 MAX_BACKWARD = 0.01
 """Share of steps into the past above which a clock cannot be used."""
 
@@ -43,8 +41,9 @@ class Piece:
         log: index of the record that it is from.
         t_s: times of the grid [s].
         cmd: target, mean over the step that ends here [rad or m].
-        held, share: targets that were held during that step, in their order, and for
-            which shares of it.
+        held, sent: the last targets, in their order, and when they were sent before the
+            end of the step [steps].
+        every: readings in a step.
         pos: encoder angle, smoothed.
         vel, acc: first and second derivative of `pos`.
         effort: effort in the unit of its column, smoothed; NaN if not logged.
@@ -56,7 +55,8 @@ class Piece:
     t_s: Float[np.ndarray, " n"]
     cmd: Float[np.ndarray, "n j"]
     held: Float[np.ndarray, "n s j"]
-    share: Float[np.ndarray, "n s j"]
+    sent: Float[np.ndarray, "n s j"]
+    every: int
     pos: Float[np.ndarray, "n j"]
     vel: Float[np.ndarray, "n j"]
     acc: Float[np.ndarray, "n j"]
@@ -98,7 +98,7 @@ def pieces_of(
             if len(kept) == len(parts):
                 stacked = {k: np.stack([p[k] for p in kept], -1) for k in kept[0]}
                 t_s = start + step_s * np.arange(len(stacked["pos"]))
-                pieces.append(Piece(log=index, t_s=t_s, **stacked))
+                pieces.append(Piece(log=index, t_s=t_s, every=every, **stacked))
     return pieces
 
 
@@ -139,7 +139,7 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
     fine_s = step_s / every
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
     columns, valid = {}, np.ones(len(fine), bool)
-    held = share = np.zeros((len(fine), 1))
+    held = sent = np.zeros((len(fine), 1))
     for key, name in names.items():
         t_s, values = _once(*log.samples(name))
         inside = (t_s >= start - MAX_FILL_S) & (t_s <= stop + MAX_FILL_S)
@@ -147,7 +147,7 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
             return None
         t_s, values = t_s[inside], values[inside]
         if key == "cmd":
-            held, share = held_targets(t_s, values, fine[::every], every + 2)
+            held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
             valid &= ~_unsaid(t_s, values, fine, 1.6 * period)
         else:
             columns[key] = np.interp(fine, t_s, values)
@@ -157,9 +157,9 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
     slope = [smoothed(columns["pos"], sigma, k)[::every] for k in (1, 2)]
     none = np.full(len(fine[::every]), np.nan)
     return {
-        "cmd": np.sum(held * share, 1),
+        "cmd": np.sum(held * shares(sent), 1),
         "held": held,
-        "share": share,
+        "sent": sent,
         "pos": smooth["pos"],
         "vel": slope[0] / fine_s,
         "acc": slope[1] / fine_s**2,
@@ -169,69 +169,12 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
     }
 
 
-def smoothed(
-    x: Float[np.ndarray, " n"], sigma: float, order: int = 0
-) -> Float[np.ndarray, " n"]:
-    """Returns a Gaussian mean over the samples, or a derivative of it.
-
-        X(ω) (iω)ᵏ exp(−ω² σ² / 2)
-
-    The record is continued by its point reflection at both ends, so value and slope
-    stay continuous there.
-
-    Args:
-        x: evenly sampled signal.
-        sigma: width [samples].
-        order: k, of the derivative per sample.
-    """
-    pad = min(len(x) - 1, int(6 * sigma) + 8)
-    head, tail = 2 * x[0] - x[pad:0:-1], 2 * x[-1] - x[-2 : -pad - 2 : -1]
-    wide = np.concatenate([head, x, tail])
-    ends = np.linspace(wide[0], wide[-1], len(wide))
-    slope = (wide[-1] - wide[0]) / (len(wide) - 1)
-    omega = 2.0 * np.pi * np.fft.rfftfreq(len(wide))
-    gain = (1j * omega) ** order * np.exp(-0.5 * (omega * sigma) ** 2)
-    out = np.fft.irfft(np.fft.rfft(wide - ends) * gain, len(wide))
-    out += (ends, slope, 0.0)[order]
-    return out[pad : pad + len(x)]
-
-
 def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Returns readings at increasing times; of several at one time the last."""
     order = np.argsort(t_s, kind="stable")
     t_s, values = t_s[order], values[order]
     last = np.append(np.diff(t_s) > 0.0, True)
     return t_s[last], values[last]
-
-
-def held_targets(
-    t_s: Float[np.ndarray, " m"],
-    values: Float[np.ndarray, " m"],
-    grid: Float[np.ndarray, " n"],
-    slots: int,
-) -> tuple[Float[np.ndarray, "n s"], Float[np.ndarray, "n s"]]:
-    """Returns the targets that were held during the steps that end on a grid.
-
-    What acts at a time is what was sent before it. Where more targets were sent in one
-    step than there are slots, the first of them are left out.
-
-    Args:
-        t_s: times at which targets were sent, increasing [s].
-        values: the targets.
-        grid: ends of the steps, evenly spaced [s].
-        slots: number of targets in a step.
-
-    Returns:
-        Targets in their order, and the shares of the step for which they were held.
-    """
-    step_s = grid[1] - grid[0]
-    last = np.searchsorted(t_s, grid, "right") - 1
-    index = last[:, None] - np.arange(slots - 1, -1, -1)
-    known = np.clip(index, 0, len(t_s) - 1)
-    start = np.where(index >= 0, t_s[known], -np.inf)
-    begin = np.clip((start - grid[:, None]) / step_s + 1.0, 0.0, 1.0)
-    begin[:, 0] = 0.0
-    return values[known], np.diff(begin, append=1.0)
 
 
 def _unsaid(

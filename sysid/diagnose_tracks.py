@@ -13,8 +13,9 @@ from sysid.diagnose_bodies import bodies_along
 from sysid.diagnose_checks import check_records
 from sysid.diagnose_doubt import sampling_doubt, timing_doubt
 from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
-from sysid.diagnose_records import SMOOTH_STEPS, Piece, grid_step_s, pieces_of, smoothed
-from sysid.mechanism import Mechanism
+from sysid.diagnose_grid import SMOOTH_STEPS, smoothed
+from sysid.diagnose_records import Piece, grid_step_s, pieces_of
+from sysid.mechanism import JointDrive, Mechanism
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,7 +119,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     fields = dict(
         cmd=stack([p.cmd[:, j] for p in pieces]),
         held=np.moveaxis(stack([p.held[:, :, j] for p in pieces]), 1, 2),
-        share=np.moveaxis(stack([p.share[:, :, j] for p in pieces]), 1, 2),
+        sent=np.moveaxis(stack([p.sent[:, :, j] for p in pieces]), 1, 2),
         pos=stack([p.pos[:, j] for p in pieces]),
         vel=stack([p.vel[:, j] for p in pieces]),
         acc=stack([p.acc[:, j] for p in pieces]),
@@ -141,6 +142,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         kp=drive.kp.value * np.array(factor),
         kd=drive.kd.value * np.ones(len(pieces)),
         measured=logged.astype(float),
+        between=np.array(float(_between(drive, pieces[0].every))),
         noise=np.zeros(4),
     )
     rows = sample_rows(steps)
@@ -196,6 +198,16 @@ def neighbour(model, joints: tuple[str, ...], j: int) -> int:
         if parent == body[j]:
             return k
     return j
+
+
+def _between(drive: JointDrive, every: int) -> bool:
+    """Tells whether the ripple of the command hides between the readings.
+
+    Without a low-pass it jumps, and nobody knows whether a reading comes before a jump
+    or after it.
+    """
+    cutoff = drive.figure("lowpass_cutoff", "cutoff_hz", np.inf)
+    return every == 1 and drive.known == "both" and bool(np.isfinite(cutoff))
 
 
 def _doubt(track: dict, drive, dt: float, rows: np.ndarray) -> np.ndarray:

@@ -70,6 +70,11 @@ class JointDrive:
                     valid = one_of(known, parameter)
                     raise InputError("drive", f"effects.{name}", parameter, valid)
 
+    def figure(self, effect: str, name: str, absent: float) -> float:
+        """Returns a parameter of an effect that the simulation has, else `absent`."""
+        found = self.effects.get(effect, {}).get(name)
+        return absent if found is None else found.value
+
 
 @dataclass(frozen=True)
 class DriveFile:

@@ -1,14 +1,18 @@
 """Grid, coordinates and folds of the diagnosis."""
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from envs.errors import InputError
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.quiet_mujoco import mujoco
 from sysid.data import make_log
-from sysid.diagnose import diagnose
-from sysid.diagnose_records import grid_step_s, pieces_of, smoothed
+from sysid.diagnose import diagnose, problem_of
+from sysid.diagnose_command import command_path
+from sysid.diagnose_grid import held_targets, shares, smoothed
+from sysid.diagnose_records import grid_step_s, pieces_of
 from sysid.diagnose_space import make_space
 from sysid.diagnose_tracks import all_tracks
 from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
@@ -63,6 +67,44 @@ def test_gravity_of_the_stand():
     assert np.asarray(track.inertia) == pytest.approx(2e-3 + 1e-4, rel=1e-4)
 
 
+def test_targets_that_are_held():
+    """The last ones before the end of a step, and how long each of them was held."""
+    t_s, values = np.array([0.0, 0.004, 0.011]), np.array([1.0, 2.0, 3.0])
+    held, sent = held_targets(t_s, values, np.array([0.0, 0.01, 0.02]), 3)
+    assert held[2] == pytest.approx([1.0, 2.0, 3.0])
+    assert sent[2, 1:] == pytest.approx([-1.6, -0.9])
+    assert shares(sent)[1] == pytest.approx([0.0, 0.4, 0.6])
+    assert shares(sent)[2] == pytest.approx([0.0, 0.1, 0.9])
+
+
+def test_a_command_between_its_targets():
+    """Sampled, a saw behind a low-pass is met at one place; its ripple is the rest."""
+    dt, cutoff, rate, delay = 0.005, 15.0, 6.0, 0.0155
+    fine = np.arange(0.0, 2.0, 1e-5)
+    arrived = rate * dt * np.floor((fine - delay) / dt + 1e-9)
+    lag = 1.0 / (2.0 * np.pi * cutoff)
+    exact = lfilter(
+        *([1.0 - np.exp(-1e-5 / lag)], [1.0, -np.exp(-1e-5 / lag)]), arrived
+    )
+    grid = np.arange(0.0, 2.0, dt)
+    held, sent = held_targets(grid, rate * grid, grid, 4)
+    params = {
+        "transport_delay": {"delay_s": jnp.array([delay])},
+        "lowpass_cutoff": {"cutoff_hz": jnp.array([cutoff])},
+    }
+    made = command_path(
+        jnp.array(held[..., None]), jnp.array(sent[..., None]), params, dt
+    )
+    path, ripple = (np.asarray(x)[:, 0, 0] for x in made)
+    rows = slice(150, 350)
+    every = round(dt / 1e-5)
+    sampled = exact[::every]
+    assert path[rows] == pytest.approx(sampled[rows], abs=1.2e-4)
+    mean = np.convolve(exact, np.ones(every) / every, "same")[::every]
+    assert ripple[rows] == pytest.approx((mean - sampled)[rows], abs=1.2e-4)
+    assert np.max(np.abs(ripple[rows])) > 5e-4
+
+
 def test_coordinates_and_identity():
     """At the base every effect of the stand vanishes, and values come back."""
     t_s = np.arange(0.0, 4.0, 0.005)
@@ -93,6 +135,23 @@ def test_records_that_are_refused(change, match):
     t_s = change["t_s"]
     with pytest.raises(InputError, match=match):
         diagnose([log_of(t_s, np.sin(t_s), np.sin(t_s))], stand())
+
+
+def test_a_torque_that_acts_late_is_no_friction():
+    """A servo holds its torque for a cycle, which `hold_s` makes good."""
+    t_s, age = np.arange(0.0, 6.0, 0.005), 5e-4
+    q = 0.3 * np.sin(2.0 * np.pi * 3.0 * t_s)
+    # The torque that is told acts so much later.
+    angle = 0.3 * np.sin(2.0 * np.pi * 3.0 * (t_s + age))
+    acc = -((2.0 * np.pi * 3.0) ** 2) * angle
+    tau = 2.1e-3 * acc + 0.2 * 9.81 * 0.1 * np.sin(q)
+    mechanism, log = stand(), log_of(t_s, q, q, tau=tau)
+    problem = problem_of(all_tracks([log], mechanism)[0], [log], mechanism, False)
+    theta = np.stack([problem.space.base] * 2)
+    names = [s.name for s in problem.space.slots]
+    theta[1, names.index("hold_s")] = age / 1e-3
+    plain, held = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
+    assert held < 0.35 * plain
 
 
 def test_joints_that_the_mechanism_lacks():

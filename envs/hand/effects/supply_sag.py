@@ -9,12 +9,15 @@ def _act(params: Params, state, x, dt):
     """Divides the torque by what all joints on the supply ask for.
 
     With inner resistance R, currents I_i = K V d_i / V₀ for demands d_i leave
-    V / V₀ = 1 / (1 + s Σ d_i), s = R K / V₀.
+    V / V₀ = 1 / (1 + s Σ d_i), s = R K / V₀. A joint that asks for more lowers its own
+    share too: it follows with the slope of τ / (1 + s Σ).
     """
     others = x.around.others_nm
-    asked = jnp.abs(x.torque) + (0.0 if others is None else others)
+    own = jnp.abs(x.torque)
+    asked = own + (0.0 if others is None else others)
     left = 1.0 / (1.0 + params["sag_per_nm"] * asked)
-    return state, x.replace(torque=left * x.torque, follows=left * x.follows)
+    slope = left * (1.0 - params["sag_per_nm"] * own * left)
+    return state, x.replace(torque=left * x.torque, follows=slope * x.follows)
 
 
 EFFECT = EffectKind(

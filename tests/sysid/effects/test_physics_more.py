@@ -36,6 +36,17 @@ def test_supply_sag_knows_the_sum_of_all_efforts():
         assert x.effort[0] == pytest.approx(expected, rel=1e-5)
 
 
+def test_a_sagging_servo_follows_with_the_slope_of_its_torque():
+    """A joint that asks for more lowers its own share too: d(τ left) / dτ < left."""
+    sag = {"supply_sag": {"sag_per_nm": 0.4}}
+    around = rig.AROUND.replace(others_nm=1.0)
+    angles = (0.5, 0.51)
+    near = [rig.run(sag, rig.hold(a, 0.01), around=around)[2] for a in angles]
+    slope = (near[1].effort[0] - near[0].effort[0]) / (rig.KP * (angles[1] - angles[0]))
+    follows = 0.5 * (near[0].follows[0] + near[1].follows[0])
+    assert follows == pytest.approx(slope, rel=1e-3)
+
+
 def test_weakness_is_a_scale_of_gains_and_limit():
     effects = {"torque_limit": {"limit_nm": 0.3}, "finger_weakness": {"strength": 0.5}}
     weak = rig.run(effects, rig.jump(0.6, 0.3))[0]

@@ -1,0 +1,72 @@
+"""Signals on an even grid: smoothed with derivatives, targets held between messages."""
+
+import numpy as np
+from jaxtyping import Float
+
+SMOOTH_STEPS = 0.8
+"""Width of the smoothing of all channels [steps of the grid]."""
+
+LONG_AGO = 1e6
+"""Age of a target of which nothing is known [steps]."""
+
+
+def smoothed(
+    x: Float[np.ndarray, " n"], sigma: float, order: int = 0
+) -> Float[np.ndarray, " n"]:
+    """Returns a Gaussian mean over the samples, or a derivative of it.
+
+        X(ω) (iω)ᵏ exp(−ω² σ² / 2)
+
+    The record is continued by its point reflection at both ends, so value and slope
+    stay continuous there.
+
+    Args:
+        x: evenly sampled signal.
+        sigma: width [samples].
+        order: k, of the derivative per sample.
+    """
+    pad = min(len(x) - 1, int(6 * sigma) + 8)
+    head, tail = 2 * x[0] - x[pad:0:-1], 2 * x[-1] - x[-2 : -pad - 2 : -1]
+    wide = np.concatenate([head, x, tail])
+    ends = np.linspace(wide[0], wide[-1], len(wide))
+    slope = (wide[-1] - wide[0]) / (len(wide) - 1)
+    omega = 2.0 * np.pi * np.fft.rfftfreq(len(wide))
+    gain = (1j * omega) ** order * np.exp(-0.5 * (omega * sigma) ** 2)
+    out = np.fft.irfft(np.fft.rfft(wide - ends) * gain, len(wide))
+    out += (ends, slope, 0.0)[order]
+    return out[pad : pad + len(x)]
+
+
+def held_targets(
+    t_s: Float[np.ndarray, " m"],
+    values: Float[np.ndarray, " m"],
+    grid: Float[np.ndarray, " n"],
+    slots: int,
+) -> tuple[Float[np.ndarray, "n s"], Float[np.ndarray, "n s"]]:
+    """Returns the last targets before the ends of steps, and when they were sent.
+
+    What acts at a time is what was sent before it.
+
+    Args:
+        t_s: times at which targets were sent, increasing [s].
+        values: the targets.
+        grid: ends of the steps, evenly spaced [s].
+        slots: number of targets that are returned.
+
+    Returns:
+        Targets in their order, and their times less the end of the step, at most zero
+        [steps]. The first target counts as sent long before.
+    """
+    step_s = grid[1] - grid[0]
+    last = np.searchsorted(t_s, grid, "right") - 1
+    index = last[:, None] - np.arange(slots - 1, -1, -1)
+    known = np.clip(index, 0, len(t_s) - 1)
+    start = np.where(index > 0, t_s[known], -np.inf)
+    return values[known], np.maximum((start - grid[:, None]) / step_s, -LONG_AGO)
+
+
+def shares(sent: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
+    """Returns for which shares of a step targets were held that were sent so."""
+    begin = np.clip(sent + 1.0, 0.0, 1.0)
+    begin[:, 0] = 0.0
+    return np.diff(begin, append=1.0)
