@@ -13,7 +13,7 @@ from hand_files import WALKING, standing_bundle
 from fingers_deploy import load_bundle
 from fingers_deploy.drivers.sim import SimulatorProcess
 from fingers_deploy.runtime.launcher import EXIT_TRIP, Launcher
-from fingers_deploy.safety import ROWS, Mode
+from fingers_deploy.safety import ROWS, Mode, Operator
 
 SEED = 500
 FAST, SLOW = 20, 100
@@ -143,6 +143,27 @@ def test_switching_to_the_stance_of_another_task_and_back(hand_model):
     begin = lab.driver.hand.data.qpos[:2].copy()
     lab.run(4.0)
     assert np.linalg.norm(lab.driver.hand.data.qpos[:2] - begin) > 0.1
+
+
+def test_a_hand_that_has_fallen_is_armed_for_recovery_only(hand_model):
+    both = load_bundle(WALKING), standing_bundle("recovery")
+    lab = Lab(hand_model, both, loop_hz=250)
+    data = lab.driver.hand.data
+    data.qpos[2:7] = 0.15, *(np.cos(0.6), np.sin(0.6), 0.0, 0.0)
+    lab.run(12.0)
+    lab.tick(Operator.ARM)
+    assert lab.mode == Mode.DISABLED and "S7" in lab.events[-1][1]
+    lab.core.selected = 1
+    lab.run(0.1)
+    begins = lab.driver.read().pos_rad
+    lab.forget()
+    lab.activate()
+    assert lab.link.policies.active == 1
+    np.testing.assert_allclose(lab.driver.written[0][1], begins, atol=0.02)
+    lab.run(9.0)
+    assert lab.mode == Mode.ACTIVE
+    lab.run(1.5)  # this policy only lies there
+    assert [f.id for f in lab.core.state.faults] == ["S7"]
 
 
 @pytest.mark.slow

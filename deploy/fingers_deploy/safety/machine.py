@@ -150,7 +150,10 @@ def _detect(
     lease = renew_lease(state.lease, inputs, t)
     sensors, found = detect_sensors(state.sensors, inputs, target, t, limits)
     joints, more = detect_joints(state.joints, inputs, target, t, limits)
-    tilt_since, tilted = detect_tilt(state.tilt_since_s, inputs, t, limits)
+    tilt_since, tilted = np.inf, {}
+    # A recovery is armed on its side; its time to get up begins when it runs.
+    if state.mode == Mode.ACTIVE or not limits.begins_at_pose:
+        tilt_since, tilted = detect_tilt(state.tilt_since_s, inputs, t, limits)
     found |= more | tilted
     found |= detect_policy(lease, inputs, target, t, limits)
     found |= detect_health(inputs, t, limits)

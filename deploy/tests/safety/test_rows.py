@@ -237,6 +237,19 @@ def test_a_joint_that_does_not_follow_trips(make_rig):
     assert "S8b" in {f.id for f in rig.state.faults}
 
 
+def test_a_recovery_may_lie_for_long_before_it_is_armed_and_then_has_ten_seconds(
+    make_rig,
+):
+    rig = make_rig(begins_at_pose=True, tilt_s=10.0)
+    rig.fault = lambda inputs, t: _rolled(90)(inputs, 0, t)
+    rig.run(15.0)
+    rig.activate()
+    begun = next(t for t, mode, _ in rig.log if mode == Mode.ACTIVE)
+    rig.run(20.0, until=Mode.STOPPING)
+    assert rig.t - begun == pytest.approx(10.0, abs=0.01)
+    assert {f.id for f in rig.state.faults} == {"S7"}
+
+
 @pytest.mark.parametrize("angle_rad", [2.5, -6.283, NAN])
 def test_an_angle_that_cannot_be_is_not_held(rig, angle_rad):
     """The joint stays where it was, instead of going to its limit at full speed."""
