@@ -147,14 +147,15 @@ def test_switching_to_the_stance_of_another_task_and_back(hand_model):
 
 def test_a_hand_that_has_fallen_is_armed_for_recovery_only(hand_model):
     both = load_bundle(WALKING), standing_bundle("recovery")
-    lab = Lab(hand_model, both, loop_hz=250)
-    data = lab.driver.hand.data
-    data.qpos[2:7] = 0.15, *(np.cos(0.6), np.sin(0.6), 0.0, 0.0)
+    lab = Lab(hand_model, both, loop_hz=250).activate()
+    lab.driver.hand.data.qpos[2:7] = 0.15, *(np.cos(0.6), np.sin(0.6), 0.0, 0.0)
     lab.run(12.0)
-    lab.tick(Operator.ARM)
-    assert lab.mode == Mode.DISABLED and "S7" in lab.events[-1][1]
+    lab.tick(Operator.CLEAR)
+    assert lab.mode == Mode.SAFE and "clear refused: S7" in lab.events[-1][1]
     lab.core.selected = 1
     lab.run(0.1)
+    lab.tick(Operator.CLEAR)
+    assert lab.mode == Mode.DISABLED
     begins = lab.driver.read().pos_rad
     lab.forget()
     lab.activate()
