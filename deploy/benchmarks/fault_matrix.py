@@ -193,7 +193,8 @@ def as_markdown(results: dict) -> str:
         "after power was switched off, every target is finite and within the limits, "
         "and nothing raised. The times count from the fault, so that they "
         "include the wait for the next answer of the policy (20 ms) or read-back "
-        "(200 ms), the fall (S7, 100 ms), or the pause of what flaps (500 ms). With no failure in 100 trials the failure rate is below "
+        "(200 ms), the fall (S7, 100 ms), or the pause of what flaps (500 ms). "
+        "With no failure in 100 trials the failure rate is below "
         "3 % (95 %).",
         when["matrix"],
         _table(results["matrix"]),
