@@ -24,13 +24,18 @@ COUNT = 200_000
 NEW_STD = 0.1
 """Standard deviation of inputs that the bundle did not have, until they are seen."""
 
+_LAYERS = ("MLP_0", "Dense_0")
+"""Parameters of the policy that are not its noise."""
+
 
 def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
     """Returns the untrained `train` with what `path` has learned.
 
     A run or checkpoint gives actor, critic and normalizer. A bundle, which may be of
     another task, gives actor and normalizer: inputs go by the names of their terms, and
-    those that the bundle did not have begin without influence.
+    those that the bundle did not have begin without influence. The action noise is that
+    of the untrained `train`: at the end of a long training there is often too much of
+    it for the clipped actions to tell one policy from another.
 
     Args:
         train: untrained networks, or their shapes.
@@ -42,18 +47,26 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
         BundleError: a damaged bundle, or one for another hand.
     """
     if path.suffix != ".onnx" and not (path / POLICY_FILE).is_file():
-        return warm_started(train, path)
+        found = warm_started(train, path)
+        fresh, params = train.params.policy["params"], found.params.policy["params"]
+        noise = {k: v for k, v in fresh.items() if k not in _LAYERS}
+        policy = {**found.params.policy, "params": {**params, **noise}}
+        return _with_policy(found, policy)
     bundle = load_bundle(path, figures().joint_names)
     theirs, ours = bundle.manifest.interface, interface_of(env)
     rows = _rows(theirs, ours)
     gain = theirs.action.scale_rad / ours.action.scale_rad
     layers = _layers(bundle, rows, gain)
     policy = _with_layers(train.params.policy, layers, bundle.source)
-    value = train.params.value
-    params = PPONetworkParams(policy=policy, value=value)  # pyright: ignore[reportCallIssue]
     mean, std = (_entries(x, rows, new) for x, new in _statistics(bundle, ours, gain))
     normalizer = _with_statistics(train.normalizer, mean, std)
-    return dataclasses.replace(train, params=params, normalizer=normalizer)
+    return dataclasses.replace(_with_policy(train, policy), normalizer=normalizer)
+
+
+def _with_policy(train: TrainState, policy: Any) -> TrainState:
+    value = train.params.value
+    params = PPONetworkParams(policy=policy, value=value)  # pyright: ignore[reportCallIssue]
+    return dataclasses.replace(train, params=params)
 
 
 def _rows(theirs: Interface, ours: Interface) -> np.ndarray:

@@ -22,10 +22,11 @@ from envs.errors import InputError
 from envs.hand_settings import HandSettings
 from fingers_mjx import checkpoint
 from fingers_mjx.checkpoint_tree import to_host
-from fingers_mjx.ppo_policy import act, load_policy, warm_started
+from fingers_mjx.ppo_policy import act, load_policy
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Diverged, OutOfSpace
 from fingers_mjx.train_session import Session
+from fingers_mjx.warm_start import started_from
 
 
 @pytest.fixture(scope="module")
@@ -134,13 +135,14 @@ def test_resume_with_another_jax_is_refused(straight, monkeypatch):
     assert error.value.field == "jax"
 
 
-def test_warm_start_takes_networks_and_normalizer_only(straight):
+def test_warm_start_takes_networks_and_normalizer_but_not_the_noise(straight):
     session = Session(make_env(16), train_setup.config())
     fresh = session.start().train
     old = checkpoint.load(straight[1].checkpoint).into(session.template()).train
-    warm = to_host(warm_started(fresh, straight[0]))
+    warm = to_host(started_from(fresh, session.env, straight[0]))
+    assert any("std_" in name for name in warm)
     for name, value in warm.items():
-        taken = name.startswith(("params/", "normalizer/"))
+        taken = name.startswith(("params/", "normalizer/")) and "std_" not in name
         source = to_host(old if taken else fresh)
         assert value.tobytes() == source[name].tobytes(), name
 
