@@ -123,9 +123,10 @@ def page(results: Results) -> str:
         f"{fuzz['control']} policies with one flipped bit, ONNX Runtime alone loads "
         f"{fuzz['control_loaded']}.",
         when["fuzz"],
-        "## Typing, pushing and stopping under the supervisor",
+        "## Typing, pushing, getting up and stopping under the supervisor",
         "The scenes and the committed policies are those of training; keys are asked "
-        "for one by one, a cube is to come within 2 cm of its target.",
+        "for one by one, a cube is to come within 2 cm of its target; a fallen hand is "
+        "armed for recovery in each of the fallen poses of training.",
         when["tasks"],
         table(_tasks(results.tasks), ("task", "trials", "result", "stopped by")),
         "## Walking under disturbances",
@@ -150,6 +151,10 @@ def _tasks(tasks: dict[str, list[dict]]) -> list[dict]:
             result = f"{hits} of {keys} keys, {latency:.2f} s after the request"
         elif "delivered" in runs[0]:
             result = f"{sum(run['delivered'] for run in runs)} delivered"
+        elif "up" in runs[0]:
+            up = [run for run in runs if run["up"]]
+            median = np.median([run["after_s"] for run in up])
+            result = f"{len(up)} stand under the crawl policy again, {median:.1f} s"
         else:
             trials = sum(run["stops"] for run in runs)
             result = "; ".join(
