@@ -26,6 +26,9 @@ MAX_FILL_S = 0.3
 FORGOTTEN_S = 0.25
 """Time after which a target that was not logged no longer acts [s]."""
 
+SHARED = 0.9
+"""Share of the targets' rows with an angle above which the rows belong to both."""
+
 MIN_PIECE_S = 1.5
 """Shorter pieces of a record are left out [s]."""
 
@@ -149,6 +152,7 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
             valid &= ~_unsaid(t_s, values, fine, 1.6 * period)
+            valid &= ~_untold(log, name, names["pos"], fine)
         else:
             columns[key] = np.interp(fine, t_s, values)
             valid &= _near(t_s, fine, 1.6 * period)
@@ -187,6 +191,25 @@ def _unsaid(
     for k in np.flatnonzero(moved):
         hidden |= (grid > t_s[k]) & (grid < t_s[k + 1] + FORGOTTEN_S)
     return hidden
+
+
+def _untold(log: MeasuredLog, cmd: str, pos: str, grid: np.ndarray) -> np.ndarray:
+    """Tells where a record that has targets beside its angles has none for long.
+
+    There the servo was switched off. Where targets have rows of their own, as messages
+    have, silence says that the last one holds.
+    """
+    told, read = (np.isfinite(log.columns[name]) for name in (cmd, pos))
+    off = np.zeros(len(grid), bool)
+    if np.mean(read[told]) < SHARED:
+        return off
+    said_s = np.append(np.sort(log.t_s[told]), np.inf)
+    alone_s = log.t_s[read & ~told]
+    for start, stop in itertools.pairwise(said_s):
+        between = np.any((alone_s > start) & (alone_s < stop))
+        if stop - start > FORGOTTEN_S and between:
+            off |= (grid > start) & (grid < stop + FORGOTTEN_S)
+    return off
 
 
 def _near(t_s: np.ndarray, grid: np.ndarray, within_s: float) -> np.ndarray:

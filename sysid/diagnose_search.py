@@ -11,6 +11,8 @@ figure far out of its tolerance is a finding and not silently absorbed.
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from sysid.diagnose_model import Model, fit_models, gain_nat
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_starts import starts_of
@@ -110,8 +112,18 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     added = [e for e in larger.effects if e not in smaller.effects]
     if all(problem.space.figured(e) for e in added):
         return gain > FIGURE_THRESHOLD
-    removed, removable = smaller.score - larger.score, base.score - samples
-    return gain > THRESHOLD and removed > LEAST_SHARE * removable
+    return gain > THRESHOLD and _shares(problem, smaller, larger, base)
+
+
+def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
+    """Tells whether enough of an error goes, in the residual where most of it goes.
+
+    A large effect in one residual must not hide a small one in the other.
+    """
+    counts = problem.counts().reshape(2, -1).sum(1)
+    removed = counts * (smaller.errors - larger.errors)
+    k = int(np.argmax(removed))
+    return bool(removed[k] > LEAST_SHARE * counts[k] * (base.errors[k] - 1.0))
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:

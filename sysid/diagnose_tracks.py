@@ -118,8 +118,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     ]
     fields = dict(
         cmd=stack([p.cmd[:, j] for p in pieces]),
-        held=np.moveaxis(stack([p.held[:, :, j] for p in pieces]), 1, 2),
-        sent=np.moveaxis(stack([p.sent[:, :, j] for p in pieces]), 1, 2),
+        held=np.moveaxis(stack(_alike([p.held[:, :, j] for p in pieces])), 1, 2),
+        sent=np.moveaxis(stack(_alike([p.sent[:, :, j] for p in pieces])), 1, 2),
         pos=stack([p.pos[:, j] for p in pieces]),
         vel=stack([p.vel[:, j] for p in pieces]),
         acc=stack([p.acc[:, j] for p in pieces]),
@@ -185,6 +185,12 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
             1e-9,
         ),
     )
+
+
+def _alike(targets: list[np.ndarray]) -> list[np.ndarray]:
+    """Repeats the oldest target where a record of another rate has more of them."""
+    most = max(x.shape[1] for x in targets)
+    return [np.pad(x, [(0, 0), (most - x.shape[1], 0)], "edge") for x in targets]
 
 
 def neighbour(model, joints: tuple[str, ...], j: int) -> int:

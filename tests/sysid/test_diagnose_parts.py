@@ -67,6 +67,32 @@ def test_gravity_of_the_stand():
     assert np.asarray(track.inertia) == pytest.approx(2e-3 + 1e-4, rel=1e-4)
 
 
+def test_records_of_different_rates():
+    logs = []
+    for rate_hz in (100.0, 250.0):
+        t_s = np.arange(0.0, 4.0, 1.0 / rate_hz)
+        logs.append(log_of(t_s, np.sin(t_s), np.sin(t_s)))
+    track = all_tracks(logs, stand())[0].track
+    assert track.held.shape == track.sent.shape
+    assert np.asarray(track.cmd)[:, 0] == pytest.approx(
+        np.asarray(track.cmd)[:, 1], abs=0.02
+    )
+
+
+def test_a_servo_that_is_off_has_no_target():
+    """Angles go on without targets: those do not count; a message's target holds."""
+    t_s = np.arange(0.0, 4.0, 0.005)
+    cmd = np.where(t_s < 2.0, np.sin(t_s), np.nan)
+    off = pieces_of(log_of(t_s, cmd, np.sin(t_s)), 0, {"knee": "tau"}, 0.005)[0]
+    assert off.valid[50:390, 0].all()
+    assert not off.valid[402:, 0].any()
+    rows = np.repeat(t_s, 2)
+    told = np.where(np.arange(len(rows)) % 2 == 0, np.repeat(cmd, 2), np.nan)
+    read = np.where(np.arange(len(rows)) % 2 == 1, np.sin(rows), np.nan)
+    on = pieces_of(log_of(rows, told, read), 0, {"knee": "tau"}, 0.005)[0]
+    assert on.valid[402:780, 0].all()
+
+
 def test_targets_that_are_held():
     """The last ones before the end of a step, and how long each of them was held."""
     t_s, values = np.array([0.0, 0.004, 0.011]), np.array([1.0, 2.0, 3.0])
