@@ -10,7 +10,7 @@ WHY = {
     "size none": "NumPy's own wheel is larger than that, half of it OpenBLAS; beside "
     "the NumPy of the system it is met",
     "L1": "other work ran on this machine meanwhile, and its host set cores aside",
-    "L2": "the host set cores aside",
+    "L2": "the host set cores aside, which nothing on this machine can prevent",
     "L4": "the host set cores aside for up to 0.1 s at a time",
     "L5": "measured before files were limited to 49 MB instead of 50 MiB; stops came "
     "after pauses of the host",
@@ -200,17 +200,19 @@ def _loops(results: Results) -> list[Goal]:
 
 def _missing(rows: list[dict]) -> str:
     missed = sum(row["missed"] for row in rows)
-    excused = sum(row["of_these_in_a_pause"] for row in rows)
-    share = f"{_missed_percent(rows):.3g} % ({missed}, of these {excused} in a pause of"
-    if len(rows) > 1:
-        each = ", ".join(f"{row['missed_percent']:.3g}" for row in rows)
-        return f"{share} the host; in the runs {each} %)"
-    return f"{share} the host)"
+    outside = missed - sum(row["of_these_in_a_pause"] for row in rows)
+    words = (
+        f"{_percent(rows, missed):.3g} % ({missed}); outside of the host's pauses "
+        f"{_percent(rows, outside):.2g} % ({outside})"
+    )
+    each = ", ".join(f"{row['missed_percent']:.3g}" for row in rows)
+    return words + (f"; run by run {each} %" if len(rows) > 1 else "")
 
 
-def _missed_percent(rows: list[dict]) -> float:
-    asked = sum(row["control_steps"] + row["skipped"] for row in rows)
-    return 100 * sum(row["missed"] for row in rows) / asked
+def _percent(rows: list[dict], count: int) -> float:
+    """Share of the control steps that were due."""
+    due = sum(row["control_steps"] + row["skipped"] for row in rows)
+    return 100 * count / due
 
 
 def _missed(rows: list[dict], name: str, words: str, limit: float) -> Goal:
@@ -220,7 +222,7 @@ def _missed(rows: list[dict], name: str, words: str, limit: float) -> Goal:
         f"{name}: 50 Hz for {minutes:g} min, {words}",
         f"≤ {limit:g} % of the steps missed",
         f"{_missing(rows)}; {busy} cores busy",
-        _missed_percent(rows) <= limit,
+        _percent(rows, sum(row["missed"] for row in rows)) <= limit,
         WHY[name],
     )
 
