@@ -12,7 +12,12 @@ from fingers_mjx.cli_play_keys import key_times, keys_asked, start_board
 from fingers_mjx.cli_progress import counting
 from fingers_mjx.cli_table import print_measures
 from fingers_mjx.evaluate_files import write_summary
-from fingers_mjx.evaluate_source import document, nominal, with_command
+from fingers_mjx.evaluate_source import (
+    document,
+    nominal,
+    with_command,
+    without_practice,
+)
 from fingers_mjx.play import Player, Schedule
 from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
 from fingers_mjx.play_keyboard import TASK as KEYBOARD
@@ -94,7 +99,7 @@ def _then_name(args: argparse.Namespace) -> str | None:
 
 def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     """Returns the worlds to play in."""
-    setup = trained if args.randomize else nominal(trained)
+    setup = without_practice(trained if args.randomize else nominal(trained))
     if args.commands and len(args.commands) == 1 and args.then is None:
         setup = with_command(setup, args.commands[0])
     if args.friction is None:

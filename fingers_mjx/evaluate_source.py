@@ -59,6 +59,17 @@ def as_deployed(setup: Setup) -> Setup:
     return dataclasses.replace(setup, env=dataclasses.replace(setup.env, settle=True))
 
 
+def without_practice(setup: Setup) -> Setup:
+    """Returns `setup` with episodes that all begin as the task says.
+
+    Only training starts from practice poses (`envs.recovery_practice`).
+    """
+    if not hasattr(setup.env, "practice_fraction"):
+        return setup
+    env = dataclasses.replace(setup.env, practice_fraction=0.0)
+    return dataclasses.replace(setup, env=env)
+
+
 def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     """Returns `setup` with one command for all of every episode.
 

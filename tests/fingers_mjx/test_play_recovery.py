@@ -13,8 +13,9 @@ from envs.recovery_falls import Falls
 from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.behaviour.command import stick_command
 from fingers_deploy.rotations import gravity
+from fingers_mjx import cli_play
 from fingers_mjx.cli import main
-from fingers_mjx.evaluate_source import nominal
+from fingers_mjx.evaluate_source import as_deployed, nominal
 from fingers_mjx.play import Player
 from fingers_mjx.play_behaviours import Behaviours, sticks_for
 from fingers_mjx.play_episodes import play_episodes
@@ -162,3 +163,19 @@ def test_a_recovery_has_no_command_of_its_own(recovery, capsys):
     args = ["play", str(recovery.source), "--command", "0.1", "0", "0"]
     assert main(args) == 2
     assert "--command" in capsys.readouterr().err
+
+
+def test_play_and_evaluation_start_from_falls_alone(recovery, setup, monkeypatch):
+    made = []
+
+    def refuse(setup, *rest):
+        made.append(setup.env)
+        raise InputError("seen", "", "", "")
+
+    env = dataclasses.replace(setup.env, practice_fraction=1.0)
+    trained = dataclasses.replace(setup, env=env)
+    monkeypatch.setattr(cli_play, "make_env", refuse)
+    monkeypatch.setattr(cli_play, "load_bundle_setup", lambda _: (recovery, trained))
+    assert main(["play", str(recovery.source), "--randomize"]) == 2
+    assert made[0].practice_fraction == 0.0
+    assert as_deployed(trained).env.settle
