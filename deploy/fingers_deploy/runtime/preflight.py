@@ -12,7 +12,6 @@ from fingers_deploy.safety.detect_sensors import valid_imu, valid_joints
 from fingers_deploy.safety.limits import Limits
 
 FRESH_S = 0.040
-_OUTSIDE_RAD = 0.05
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def _pose(reading: Reading, limits: Limits) -> Check:
     worst = int(beyond.argmax())
     outside = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
     words = outside if beyond[worst] > 0 else "every joint inside"
-    passed = valid_joints(reading) and bool(beyond[worst] <= _OUTSIDE_RAD)
+    passed = valid_joints(reading) and bool(beyond[worst] <= limits.joint_margin_rad)
     return Check("pose within limits", passed, words)
 
 

@@ -129,8 +129,10 @@ def _rest(arming: Arming, inputs: Inputs, t: float, limits: Limits) -> Progress:
 
 
 def _begin_rad(arming: Arming, limits: Limits) -> Array:
-    """Targets with which the policy begins."""
-    return arming.start_rad if limits.begins_at_pose else limits.rest_rad
+    """Targets with which the policy begins, all within the limits."""
+    if not limits.begins_at_pose:
+        return limits.rest_rad
+    return np.clip(arming.start_rad, limits.allowed_rad[:, 0], limits.allowed_rad[:, 1])
 
 
 _STEPS = {

@@ -116,16 +116,23 @@ def _check_target(
     if memory.fresh:
         steps = min(max(memory.answered - memory.tick, 1), _MAX_STEPS)
     step = np.abs(proposed - target_rad).max()
-    low, high = limits.trained_rad[:, 0], limits.trained_rad[:, 1]
-    beyond = np.maximum(low - proposed, proposed - high).max()
+    beyond, before = _outside(proposed, limits), _outside(target_rad, limits)
     if proposal.fault == PolicyFault.OUTPUT:
         found["S4"] = "policy output not finite"
-    elif not (np.isfinite(step) and np.isfinite(beyond)):
+    elif not np.isfinite(step):
         found["S4"] = "proposed target not finite"
     elif step > steps * limits.step_rad + limits.step_tolerance_rad:
         found["S4"] = f"proposed step of {step:.3f} rad"
-    elif beyond > limits.target_margin_rad:
-        found["S4"] = f"proposed target {beyond:.3f} rad outside the trained limits"
+    elif (beyond > np.maximum(before, limits.target_margin_rad)).any():
+        # Where a hand is armed that leans on its stops, the targets begin outside.
+        words = f"{beyond.max():.3f} rad outside the trained limits"
+        found["S4"] = f"proposed target {words}"
+
+
+def _outside(target_rad: Array, limits: Limits) -> Array:
+    """How far targets are outside the trained limits, negative inside [rad], [20]."""
+    low, high = limits.trained_rad[:, 0], limits.trained_rad[:, 1]
+    return np.maximum(low - target_rad, target_rad - high)
 
 
 def _age(age_s: float) -> str:

@@ -23,6 +23,10 @@ TILT = {
     "recovery": (35.0, 30.0, 10.0),
 }
 
+# A hand that gets up leans on joints at their stops, which give under its weight: by up
+# to 0.12 rad in simulation.
+RECOVERY_JOINT_MARGIN_RAD = 0.15
+
 
 @dataclass(frozen=True)
 class Limits:
@@ -127,6 +131,8 @@ def make_limits(manifest: Manifest, factory_rad: Array, **changes: Any) -> Limit
     trained = np.asarray(interface.joint_limits_rad, np.float64)
     allowed = intersect(trained, factory_rad, interface.joint_names)
     rest = np.asarray(interface.initial_target_rad, np.float64)
+    recovers = manifest.task == "recovery"
+    margin = {"joint_margin_rad": RECOVERY_JOINT_MARGIN_RAD} if recovers else {}
     limits = Limits(
         trained_rad=trained,
         factory_rad=factory_rad,
@@ -138,9 +144,9 @@ def make_limits(manifest: Manifest, factory_rad: Array, **changes: Any) -> Limit
         max_roll_rad=float(np.deg2rad(roll)),
         max_pitch_rad=float(np.deg2rad(pitch)),
         tilt_s=tilt_s,
-        begins_at_pose=manifest.task == "recovery",
+        begins_at_pose=recovers,
     )
-    return dataclasses.replace(limits, **changes)
+    return dataclasses.replace(limits, **(margin | changes))
 
 
 def intersect(trained: Array, factory: Array, names: tuple[str, ...]) -> Array:

@@ -119,7 +119,7 @@ ROWS = (
     Row(
         "S8",
         "joint limit",
-        "a joint outside its factory limits by more than 0.05 rad",
+        "a joint outside its factory limits by more than 0.05 rad (recovery: 0.15)",
         0.060,
         HOLD,
     ),

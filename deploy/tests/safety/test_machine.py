@@ -282,6 +282,19 @@ def test_a_recovery_begins_where_the_hand_lies(bundle, limits, make_rig, task):
     np.testing.assert_allclose(rig.out.target_rad, begins, atol=0.01)
 
 
+def test_a_recovery_that_leans_on_a_stop_begins_within_the_limits(make_rig):
+    rig = make_rig(begins_at_pose=True, joint_margin_rad=0.15)
+    high = rig.limits.allowed_rad[2, 1]
+    rig.pos[2] = high + 0.12
+    rig.run(0.1)
+    first = rig.tick(Operator.ARM).target_rad
+    assert first[2] > high + 0.11  # no step when it is energized
+    rig.run(60, until=Mode.ACTIVE)
+    assert rig.out.target_rad[2] == high
+    rig.run(0.5)
+    assert rig.state.mode == Mode.ACTIVE and rig.state.faults == ()
+
+
 def test_hold_goes_to_the_measured_pose_without_a_jump(rig):
     pose = rig.pos.copy()
     rig.fault = lambda i, t: BOOLEANS["overrun"](i)

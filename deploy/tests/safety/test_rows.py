@@ -8,6 +8,7 @@ import pytest
 from fingers_deploy.rotations import multiply
 from fingers_deploy.safety import ROWS, Mode, Operator, PolicyFault, Reaction
 from fingers_deploy.safety.latch import severest
+from fingers_deploy.safety.limits import make_limits
 from fingers_deploy.safety.table import BY_ID
 
 DT = 0.002
@@ -248,6 +249,20 @@ def test_a_recovery_may_lie_for_long_before_it_is_armed_and_then_has_ten_seconds
     rig.run(20.0, until=Mode.STOPPING)
     assert rig.t - begun == pytest.approx(10.0, abs=0.01)
     assert {f.id for f in rig.state.faults} == {"S7"}
+
+
+@pytest.mark.parametrize(("task", "stops"), [("crawl", True), ("recovery", False)])
+def test_a_hand_that_gets_up_may_lean_on_its_stops(
+    bundle, limits, make_rig, task, stops
+):
+    made = make_limits(replace(bundle.manifest, task=task), limits.factory_rad)
+    rig = make_rig(joint_margin_rad=made.joint_margin_rad).activate()
+    leans = limits.factory_rad[2, 1] + 0.12
+    rig.fault = lambda inputs, t: _reading(pos_rad=lambda r: _set(r.pos_rad, 2, leans))(
+        inputs, 0, t
+    )
+    rig.run(0.1)
+    assert ("S8" in {f.id for f in rig.state.faults}) == stops
 
 
 @pytest.mark.parametrize("angle_rad", [2.5, -6.283, NAN])
