@@ -105,6 +105,8 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         with witnesses() as pauses:
             operate(launcher, seconds, memory.sample)
         took, after = time.monotonic() - begin, processor_s()
+        if took < seconds:
+            raise SystemExit("\n".join(["the run ended early", *lines[-9:]]))
         files = sorted(Path(out).glob("*.mcap"))
         largest = max(file.stat().st_size for file in files)
         recorded = [_recorded(file, pauses) for file in files]
