@@ -19,11 +19,13 @@ TOLD = {
     "crawl": POLICIES.parents[1] / "README.md",
     "keyboard": POLICIES / "keyboard" / "README.md",
     "push": POLICIES / "push" / "README.md",
+    "recovery": POLICIES / "recovery" / "README.md",
 }
 MEASURES = {
     "crawl": ("task_speed_mps", "path_speed_mps", "turn_rate_error_rad_s"),
     "keyboard": ("correct_fraction", "latency_median_s"),
     "push": ("delivered", "delivered_from_30_cm"),
+    "recovery": ("righted", "righted_thumb", "time_to_upright_s"),
 }
 
 each = pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: folder.name)
