@@ -1,11 +1,13 @@
-"""Typing, pushing and stopping under the supervisor.
+"""Typing, pushing, getting up and stopping under the supervisor.
 
     python deploy/benchmarks/task_runs.py --trials 10
 
 Everything is the shim's own code, as in `fault_lab`; the scenes are those of training;
 keys are asked for, their events come from the scene; a camera's samples go through the
 socket, 60 of them a second and 40 ms late. Pushing is tried as it is, and with the rows
-on effort and tracking (S5, S8b) off. A hand that walks is stopped by the operator.
+on effort and tracking (S5, S8b) off. A hand that has fallen is armed for recovery in
+each of the fallen poses of training, and is to stand under the crawl policy again. A
+hand that walks is stopped by the operator.
 """
 
 import argparse
@@ -24,6 +26,7 @@ from hand_files import WALKING, write_model
 
 from envs.keyboard_model import ACTUATION_M, ARROWS
 from envs.push_scene import HALF_M
+from envs.recovery_falls import load_falls
 from envs.registry import make_batch
 from fingers_deploy.behaviour.command import FixedCommand
 from fingers_deploy.behaviour.key_runner import KeyRunner
@@ -36,7 +39,7 @@ from fingers_deploy.safety import Mode, Operator
 POLICIES = WALKING.parent
 CAMERA_S, LATE_S, CONTROL_S = 1 / 60, 0.04, 0.02
 ENTER_M = 0.02
-FALLEN_RAD, STOPS = 0.7, 24
+FALLEN_RAD, LEVEL_RAD, STOPS = 0.7, 0.17, 24
 
 
 class TypedOn:
@@ -180,6 +183,37 @@ def stop_walking(folder: Path, wait_s: float, trials: int) -> dict:
     return {"wait_s": wait_s, "stops": trials, "falls": falls}
 
 
+def get_up(folder: Path, number: int) -> dict:
+    """Arms a hand that has fallen for recovery; returns what came of it.
+
+    Args:
+        folder: for the model.
+        number: of the fallen pose.
+    """
+    env, falls = make_batch("recovery", 1), load_falls()
+    path = folder / "recovery.mjb"
+    mujoco.mj_saveModel(env.mj_model, str(path), None)
+    both = tuple(load_bundle(POLICIES / name) for name in ("crawl", "recovery"))
+    lab = Lab(path, both, sticks=(), loop_hz=250, seed=number)
+    hand, lab.core.selected = lab.driver.hand, 1
+    hand.data.qpos[:27] = falls.qpos[number]
+    mujoco.mj_forward(hand.model, hand.data)
+    hand.target_rad = np.array(falls.target_rad[number])
+    lab.activate()
+    begin = lab.clock.t
+    while lab.mode == Mode.ACTIVE and lab.link.policies.active == 1:
+        lab.run(CONTROL_S)
+    took_s = lab.clock.t - begin
+    lab.run(2.0)
+    level = tilt_angle(hand.data.qpos[3:7], lab.core.limits.v_quat_b)
+    return {
+        "side": falls.side[number],
+        "up": lab.mode == Mode.ACTIVE and level < LEVEL_RAD,
+        "after_s": round(took_s, 1),
+        "faults": [fault.id for fault in lab.core.state.faults],
+    }
+
+
 def _place_cube(lab: Lab, rng: np.random.Generator) -> np.ndarray:
     """Puts the cube before the hand; returns its target, [2]."""
     qpos = lab.driver.hand.data.qpos
@@ -212,6 +246,7 @@ def main() -> int:
             "push, S5 and S8b off": [
                 push_cube(folder, k, watched=False) for k in range(options.trials)
             ],
+            "recovery": [get_up(folder, k) for k in range(len(load_falls().side))],
             "stop at full speed": [
                 stop_walking(folder, wait_s, STOPS) for wait_s in (0.0, 0.5)
             ],

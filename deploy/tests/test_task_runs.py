@@ -1,7 +1,7 @@
 """The committed policies of other tasks under the supervisor, in their scenes."""
 
 import pytest
-from task_runs import push_cube, type_keys
+from task_runs import get_up, push_cube, type_keys
 
 from envs.keyboard_model import ARROWS
 
@@ -26,3 +26,8 @@ def test_a_push_policy_at_the_limit_of_its_efforts_is_stopped(folder):
     pushed = push_cube(folder, seed=2)
     strains = pushed["at_effort_limit"] > 0.5
     assert bool(set(pushed["faults"]) & {"S5", "S8b"}) == strains
+
+
+@pytest.mark.parametrize("number", [0, 20])
+def test_a_fallen_hand_gets_up_and_stands_under_the_other_policy(folder, number):
+    assert get_up(folder, number)["up"]
