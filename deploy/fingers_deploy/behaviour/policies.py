@@ -1,6 +1,7 @@
 """The policy's side of the link: which policy runs, told what.
 
     operator selects ──► policy ──(recovery, upright)──► settle ramp ──► first policy
+        │                  └── a recovery that begins upright: settle ramp at once
         └── another stance ──► stand ──► ramp to the own one, to that ──► policy
 
 A recovery policy that is the first itself goes on holding the stance after the ramp.
@@ -68,7 +69,7 @@ class Policies:
         self._ramp: Ramp | None = None
         self._stances: tuple[int, ...] = ()
         self._then: int | None = None
-        self._held = False
+        self._held = self._getting_up = False
         self._stood_s = self._upright_s = np.inf
 
     @property
@@ -96,6 +97,8 @@ class Policies:
         told = self.sources.hear(packet, interface, self._stood_s < np.inf)
         inputs = inputs_of(interface, told.given, packet["pos"])
         fault = PolicyFault.NONE
+        if packet["runs"]:
+            self._spare_recovery(packet, target, t)
         if packet["runs"] and self._ramp is not None:
             target = self._follow_ramp(self._ramp, packet, told, t)
         elif packet["runs"] and not told.moves:
@@ -122,7 +125,7 @@ class Policies:
         """Everything starts afresh at the targets on the wire."""
         self._moments.clear()
         self.sources.rest()
-        self._ramp, self._held = None, False
+        self._ramp, self._held, self._getting_up = None, False, False
         self._stood_s = self._upright_s = np.inf
         selected = int(packet["policy"])
         if 0 <= selected < len(self._controllers):
@@ -164,7 +167,7 @@ class Policies:
             tuple(self._moments), self._interface(number), controller.assembler
         )
         controller.resume(history, action, target)
-        self._active, self._held = number, False
+        self._active, self._held, self._getting_up = number, False, False
 
     def _interface(self, number: int) -> Interface:
         return self._controllers[number].bundle.manifest.interface
@@ -191,17 +194,35 @@ class Policies:
             Moment(packet["pos"], down, packet["gyro"], told.given, asked_rad)
         )
 
+    def _spare_recovery(self, packet: np.void, target: Array, t: float) -> None:
+        """A hand that stands as a recovery begins is not thrown over: it settles."""
+        if not self._recovers() or self._getting_up or self._ramp is not None:
+            return
+        since_s, _ = self._upright(np.inf, packet, t)
+        self._getting_up = since_s == np.inf
+        if not self._getting_up:
+            self._end_recovery(target, t)
+
     def _look_for_upright(self, packet: np.void, target: Array, t: float) -> None:
         """Recovery is over once the hand is upright: settle, then the first policy."""
-        manifest = self._controllers[self._active].bundle.manifest
-        if manifest.task != RECOVERY or self._stood_s < np.inf:
+        if not self._recovers():
             return
-        tilt = tilt_angle(packet["quat"], manifest.interface.v_quat_b)
-        speed = float(np.linalg.norm(packet["gyro"]))
-        self._upright_s, upright = upright_step(self._upright_s, tilt, speed, t)
+        self._upright_s, upright = self._upright(self._upright_s, packet, t)
         if upright:
-            self._settle((0,), target, t)
-            self._then = 0 if self._active != 0 else None
+            self._end_recovery(target, t)
+
+    def _recovers(self) -> bool:
+        manifest = self._controllers[self._active].bundle.manifest
+        return manifest.task == RECOVERY and self._stood_s == np.inf
+
+    def _upright(self, since_s: float, packet: np.void, t: float) -> tuple[float, bool]:
+        tilt = tilt_angle(packet["quat"], self._interface(self._active).v_quat_b)
+        speed = float(np.linalg.norm(packet["gyro"]))
+        return upright_step(since_s, tilt, speed, t)
+
+    def _end_recovery(self, target: Array, t: float) -> None:
+        self._settle((0,), target, t)
+        self._then = 0 if self._active != 0 else None
 
     def _follow_ramp(self, ramp: Ramp, packet: np.void, told: Told, t: float) -> Array:
         target = ramp.target(t)

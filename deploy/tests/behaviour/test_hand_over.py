@@ -206,11 +206,29 @@ def test_recovery_alone_holds_the_stance_that_it_settled_into(
     bundle_factory, interface
 ):
     runner = Runner([_recovery(bundle_factory, interface)])
-    for k in range(150):
+    upright, runner.quat = runner.quat, np.array([1.0, 0, 0, 0])
+    for k in range(160):
         runner.step()
-        assert runner.policies.settling == (k >= 25)
+        assert runner.policies.settling == (k >= 35)
+        runner.quat = upright if k >= 9 else runner.quat
     stance = np.asarray(interface.initial_target_rad)
     np.testing.assert_allclose(runner.target, stance, atol=1e-12)
+
+
+@pytest.mark.parametrize("walks_first", [True, False])
+def test_a_hand_that_stands_is_not_given_to_a_recovery(
+    bundle, bundle_factory, interface, walks_first, monkeypatch
+):
+    """It settles at once, wherever the selection comes from."""
+    runner = Runner([bundle, _recovery(bundle_factory, interface)])
+    if walks_first:
+        for _ in range(20):
+            runner.step(policy=0)
+    recovery = runner.policies._controllers[1]
+    monkeypatch.setattr(recovery, "step", None)  # whoever called it would fail
+    answers = [runner.step(policy=1) for _ in range(220)]
+    assert runner.policies.active == 0 and not runner.policies.settling
+    assert [a.policy for a in answers[:75]] == [1] * 75
 
 
 def test_heading_hold_replaces_the_yaw_rate(bundle):
