@@ -84,7 +84,10 @@ def _examined(
     track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism
 ) -> Examined:
     """Searches one joint, if it moved."""
-    moved = np.ptp(np.asarray(track.track.cmd)) > LEAST_MOTION
+    seen = [track.track.cmd]
+    if mechanism.drives[track.joint].known == "controller":
+        seen.append(track.track.pos)  # pulled by forces that nobody knows
+    moved = any(np.ptp(np.asarray(x)) > LEAST_MOTION for x in seen)
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)

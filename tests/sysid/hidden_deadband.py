@@ -1,0 +1,68 @@
+"""Records a finger whose servos have a deadband, in a simulator that shares no code.
+
+    PYTHONPATH=.:tests python tests/sysid/hidden_deadband.py --out deadband
+
+Writes `finger.parquet`, three rounds of the standard recording of a ring finger on a
+stand with noise and slightly wrong believed figures, and `real.yaml`, the hand of which
+every joint has that deadband: the stand-in for the hardware of README.md.
+"""
+
+import argparse
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+from hidden.recording import Recording, standard
+from hidden.sampling import Noise, record
+from hidden.stands import make_stand, slightly_wrong
+
+from envs.hand.hand_file import (
+    EFFECTS,
+    Effect,
+    Quantity,
+    load_hand_file,
+    save_hand_file,
+)
+from sysid.data import MeasuredLog
+from sysid.data_read import write_log
+
+HALF_WIDTH_RAD = 0.04
+RATE_HZ, ROUND_S, ROUNDS = 200.0, 12.0, 3
+SEED = 8
+
+
+def main() -> None:
+    """Writes both files."""
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("--out", type=Path, default=Path("deadband"))
+    out = parser.parse_args().out
+    out.mkdir(parents=True, exist_ok=True)
+    write_log(finger_log(), out / "finger.parquet")
+    unit = EFFECTS["deadband"]["half_width_rad"]
+    width = Quantity(HALF_WIDTH_RAD, unit, "user")
+    deadband = Effect("deadband", {"half_width_rad": width}, ("all",))
+    hand = dataclasses.replace(load_hand_file(), effects=(deadband,))
+    save_hand_file(hand, out / "real.yaml")
+
+
+def finger_log() -> MeasuredLog:
+    """Records the finger."""
+    rng = np.random.default_rng(SEED)
+    stand = make_stand("finger", rng, lowpass_hz=3.0)
+    once = standard(rng, stand.middle, stand.reach, RATE_HZ, ROUND_S, 1, False)
+    truth = slightly_wrong(stand.mechanism, rng)
+    for joint in stand.moved:
+        truth = truth.with_effect(joint, "deadband", half_width_rad=HALF_WIDTH_RAD)
+    rows = len(once.targets)
+    parts = tuple(
+        (name, k, first + k * rows, last + k * rows)
+        for k in range(ROUNDS)
+        for name, _, first, last in once.parts
+    )
+    rounds = Recording(RATE_HZ, np.tile(once.targets, (ROUNDS, 1)), parts)
+    quat_w = stand.mechanism.base_quat_w
+    return record(truth, rounds, Noise(), rng, palm_quat_w=quat_w, source="a stand")
+
+
+if __name__ == "__main__":
+    main()
