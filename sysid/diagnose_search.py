@@ -88,7 +88,7 @@ def _searched(problem: Problem, base: Model) -> Search:
         if not worth:
             break
         winner = worth[0]
-        again = fit_models(problem, [best.effects], [winner.fit.theta])[0]
+        again = _beside(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
             if not _worth(problem, again, winner, base):
                 break
@@ -131,9 +131,25 @@ def settled(problem: Problem) -> tuple[Problem, Model]:
     theta = problem.space.base
     for _ in range(3):
         problem = problem.with_noise(problem.raw(theta[None], weigh=False)[0])
-        model = fit_models(problem, [()], [theta])[0]
+        model = _beside(problem, (), theta)
         theta = model.fit.theta
     return problem, model
+
+
+def _beside(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> Model:
+    """Fits from where a fit is, and from delays beside it; returns the best.
+
+    Where targets arrive just when readings are taken, the error has a kink, at which a
+    fit would stay.
+    """
+    slots, starts = problem.space.slots, [theta]
+    for i in problem.space.of("transport_delay"):
+        for way in (-1.0, 1.0) if 0.0 < slots[i].tight < np.inf else ():
+            moved = theta.copy()
+            moved[i] = max(moved[i] + way * slots[i].tight, slots[i].low)
+            starts.append(moved)
+    models = fit_models(problem, [effects] * len(starts), starts)
+    return min(models, key=lambda m: m.fit.cost)
 
 
 def extended(problem: Problem, model: Model) -> list[Model]:

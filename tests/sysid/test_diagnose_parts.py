@@ -3,6 +3,8 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from hidden.believed import believed
+from hidden.cases import draw_case
 from scipy.signal import lfilter
 
 from envs.errors import InputError
@@ -13,6 +15,7 @@ from sysid.diagnose import diagnose, problem_of
 from sysid.diagnose_command import command_path
 from sysid.diagnose_grid import held_targets, shares, smoothed
 from sysid.diagnose_records import grid_step_s, pieces_of
+from sysid.diagnose_search import settled
 from sysid.diagnose_space import make_space
 from sysid.diagnose_tracks import all_tracks
 from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
@@ -178,6 +181,24 @@ def test_a_torque_that_acts_late_is_no_friction():
     theta[1, names.index("hold_s")] = age / 1e-3
     plain, held = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
     assert held < 0.35 * plain
+
+
+def test_a_fit_leaves_the_kink_of_a_delay():
+    """Believed are four steps of the grid, where targets arrive as readings are taken.
+
+    On this record a fit from there alone stays there, and the rest looks like latency.
+    """
+    case = draw_case(707 * 100_003 + 11, kind="joint")
+    mechanism, logs = believed(case.stand), list(case.logs)
+    track = next(t for t in all_tracks(logs, mechanism) if t.joint == case.joint)
+    problem = problem_of(track, logs, mechanism, False)
+    (at,) = problem.space.of("transport_delay")
+    figure = problem.space.slots[at]
+    assert figure.value(problem.space.base[at]) == pytest.approx(4.0 * track.dt)
+    delay_s = case.truth.joints[case.stand.names.index(case.joint)].delay_s
+    found = figure.value(settled(problem)[1].fit.theta[at])
+    assert found == pytest.approx(delay_s, abs=3e-4)
+    assert abs(4.0 * track.dt - delay_s) > 6e-4
 
 
 def test_joints_that_the_mechanism_lacks():
