@@ -1,13 +1,16 @@
 """What the causes gain on folds that no fit saw, and what no model can remove."""
 
+from dataclasses import replace
+
 import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnose_forced import sample_rows
 from sysid.diagnose_loop import simulated
-from sysid.diagnose_model import Model
+from sysid.diagnose_model import Model, fit_models
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_search import Search
+from sysid.diagnose_space import SIGMA, Space
 from sysid.diagnosis import Gain
 
 BLOCKS = 24
@@ -22,21 +25,32 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
         units: of `position`, `controller` and `mechanics`.
         seed: of the bootstrap over blocks of time.
     """
-    gains = {}
+    gains, base = {}, within_tolerances(found.problem, found.base)
     for name, k in (("controller", 0), ("mechanics", 1)):
         if found.problem.valid[k].any():
-            before, after = (
-                _heldout(found.problem, m, k) for m in (found.base, found.best)
-            )
+            before, after = (_heldout(found.problem, m, k) for m in (base, found.best))
             gains[name] = _gain(found.problem, before, after, k, units[name], seed)
     if found.problem.valid[:2].any((1, 2)).all() or not found.problem.data.effort.any():
-        before, after = (
-            _angle_errors(found.problem, m) for m in (found.base, found.best)
-        )
+        before, after = (_angle_errors(found.problem, m) for m in (base, found.best))
         gains["position"] = _gain(
             found.problem, before, after, 1, units["position"], seed
         )
     return gains
+
+
+def within_tolerances(problem: Problem, base: Model) -> Model:
+    """Fits the figures of the simulation again, none of them beyond its tolerance.
+
+    A search lets them go further, at a price; but an error that a figure out of its
+    tolerance would hide is there before the cause is known.
+    """
+    slots = []
+    for slot in problem.space.slots:
+        reach = slot.tight / SIGMA if slot.tight > 0.0 else np.inf
+        low, high = max(slot.low, slot.base - reach), min(slot.high, slot.base + reach)
+        slots.append(replace(slot, low=low, high=high))
+    bounded = replace(problem, space=Space(tuple(slots)))
+    return fit_models(bounded, [()], [base.fit.theta])[0]
 
 
 def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, "m p"]:

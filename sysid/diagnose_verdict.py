@@ -56,7 +56,7 @@ def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict
     blind = _blind(searched)
     left = [text for e in searched for text in _left(e)]
     first = _leading(searched, causes)
-    gain = _main(gains[first.track.joint], first.search) if causes else None
+    gain = _main(gains[first.track.joint]) if causes else None
     rivals = _alternatives(first.search) if causes else ()
     verdict = _word(causes, rivals, left, searched, blind)
     return _fields(
@@ -299,8 +299,10 @@ def _left(examined) -> list[str]:
     return texts
 
 
-def _main(gains: dict[str, Gain], found: Search) -> Gain:
+def _main(gains: dict[str, Gain]) -> Gain:
     """Chooses the gain to tell first: of the residual that differed most."""
-    present = [k for k, name in enumerate(CHANNELS) if name in gains]
-    first = max(present, key=lambda k: found.base.errors[k])
-    return gains[CHANNELS[first]]
+
+    def differs(gain: Gain) -> float:
+        return gain.heldout_rmse_before / (gain.noise_floor or gain.heldout_rmse_after)
+
+    return max((gains[name] for name in CHANNELS if name in gains), key=differs)
