@@ -12,7 +12,7 @@ WHY = {
     "L1": "other work ran on this machine meanwhile, and its host set cores aside",
     "L2": "the host set cores aside, which nothing on this machine can prevent",
     "L4": "the host set cores aside for up to 0.1 s at a time",
-    "L5": "measured before files were limited to 49 MB instead of 50 MiB; stops came "
+    "L5": "the long run was before files were limited to 49 MB; its stops came "
     "after pauses of the host",
 }
 """Reasons, told where a line is missed."""
