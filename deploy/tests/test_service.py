@@ -94,6 +94,18 @@ def wait_for(process, words):
     raise AssertionError("".join(said))
 
 
+def arm(pipe, process):
+    """Asks to arm until it is taken: refused until the policy's process answers."""
+    wait_for(process, "type: arm")
+    refused = True
+    while refused:
+        os.write(pipe, b"arm\n")
+        line = process.stdout.readline()
+        assert line, process.poll()
+        refused = "disabled -> arming" not in line
+    wait_for(process, "arming -> active")
+
+
 def network_sockets(group):
     """Sockets that any process of the group has open on a network."""
     listed = set()
@@ -121,15 +133,7 @@ def sockets(process):
 
 def test_a_run_typed_at_through_a_pipe_has_nothing_open_on_a_network(service):
     pipe, process = service
-    wait_for(process, "type: arm")
-    # The policy's process takes a while; until it answers, arming is refused.
-    refused = True
-    while refused:
-        os.write(pipe, b"arm\n")
-        line = process.stdout.readline()
-        assert line, process.poll()
-        refused = "disabled -> arming" not in line
-    wait_for(process, "arming -> active")
+    arm(pipe, process)
     assert network_sockets(process.pid) == []
     os.write(pipe, b"quit\n")
     wait_for(process, "de-energized, confirmed")
@@ -139,12 +143,7 @@ def test_a_run_typed_at_through_a_pipe_has_nothing_open_on_a_network(service):
 def test_a_request_to_end_that_reaches_every_process_settles_the_hand(service):
     """As a service manager sends it, at the end of a run or of the computer."""
     pipe, process = service
-    wait_for(process, "type: arm")
-    refused = True
-    while refused:
-        os.write(pipe, b"arm\n")
-        refused = "disabled -> arming" not in process.stdout.readline()
-    wait_for(process, "arming -> active")
+    arm(pipe, process)
     os.killpg(process.pid, signal.SIGTERM)
     wait_for(process, "OP operator stop: asked for -> settle")
     wait_for(process, "de-energized, confirmed by the hand")
