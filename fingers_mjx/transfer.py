@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import jax
 import numpy as np
 
 from envs.errors import InputError
@@ -116,13 +117,7 @@ def drift(table: EpisodeTable) -> dict[str, np.ndarray]:
     speed to the left in V. Both over the steps before a fall.
     """
     traces = table.traces
-    alive = np.stack(
-        [
-            np.asarray(steps_alive(traces.done[:, i], traces.failed[:, i]))
-            for i in range(traces.done.shape[1])
-        ],
-        axis=1,
-    )
+    alive = np.asarray(jax.vmap(steps_alive, 1, 1)(traces.done, traces.failed))
     count = np.maximum(alive.sum(0), 1)
     turned = np.where(alive, traces.yaw_rate, 0.0).sum(0) / count
     sideways = np.where(alive, traces.vel_v[..., 1], 0.0).sum(0) / count
