@@ -1,5 +1,7 @@
 """Practice poses lie on the way down, and only training starts from them."""
 
+import json
+
 import jax
 import numpy as np
 import pytest
@@ -9,7 +11,13 @@ from envs.hand.model import build_model
 from envs.hand.stance import stance_of
 from envs.recovery import RecoveryConfig, RecoveryEnv
 from envs.recovery_falls import clearance_m, down_b, load_falls, turned_down
-from envs.recovery_practice import SINKING, TIPPING, load_practice
+from envs.recovery_practice import (
+    SINKING,
+    TIPPING,
+    load_practice,
+    practice_json,
+    settle_practice,
+)
 
 HAND = load_hand_file()
 LEVEL = down_b(np.array(stance_of(HAND).qpos))
@@ -26,6 +34,12 @@ def test_stored_poses_are_spread_from_the_stance_to_the_farthest_fall():
     assert np.max(np.diff(np.sort(tilts))) < 10.0
     farthest = max(tilt_deg(pose) for pose in load_falls().qpos)
     assert abs(tilts.max() - farthest) < 5.0
+
+
+@pytest.mark.slow
+def test_stored_poses_are_those_of_the_default_hand():
+    made = json.loads(practice_json(settle_practice(HAND, stance_of(HAND))))
+    np.testing.assert_allclose(made, load_practice(), atol=1e-4)
 
 
 def test_stored_poses_do_not_reach_into_the_floor():
