@@ -2,8 +2,8 @@
 
     iteration, iterations   done and in all
     env_steps               control steps of all worlds, since the start of the run
-    elapsed_s, time_s       training time over all sessions; seconds since 1970
-    steps_per_s, eta_s      of this session, once the first call has compiled
+    elapsed_s, time_s       training time over all starts; seconds since 1970
+    steps_per_s, eta_s      since the last start, once the first call has compiled
     episode/return          mean return of the episodes that ended
     episode/length          mean length of the episodes that ended [control steps]
     episode/ended, failed   number of episodes that ended; of those, by a failure
