@@ -76,7 +76,7 @@ def fuzz(path, text, load, count):
     rng, refused = random.Random(SEED), 0
     for _ in range(count):
         path.write_bytes(mutated(rng, text))
-        start = time.monotonic()
+        start = time.process_time()
         try:
             value = load(path)
         except InputError as error:
@@ -85,7 +85,7 @@ def fuzz(path, text, load, count):
         else:  # what is accepted is complete and sound: it can be written again
             path.write_text(dump_yaml(value), encoding="utf-8")
             assert to_dict(load(path)) == to_dict(value)
-        assert time.monotonic() - start < 10
+        assert time.process_time() - start < 10
     return refused
 
 

@@ -275,10 +275,10 @@ def test_hostile_and_malformed_models_are_refused(tmp_path, name):
     write(folder, "<mujoco/>", "two.xml")
     (folder / "link.xml").symlink_to(tmp_path / "x.xml")
     os.mkfifo(folder / "pipe")
-    start = time.perf_counter()
+    start = time.process_time()
     with pytest.raises(InputError) as caught:
         load_custom_hand(write(folder, text))
-    assert time.perf_counter() - start < 5.0
+    assert time.process_time() - start < 5.0
     assert message in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -332,14 +332,14 @@ def fuzz(tmp_path: Path, count: int) -> int:
     print(f"seed {SEED}")
     rng, refused = random.Random(SEED), 0
     for _ in range(count):
-        start = time.perf_counter()
+        start = time.process_time()
         try:
             hand = load_custom_hand(write(tmp_path, mutate(rng, GOOD)))
         except InputError:
             refused += 1
         else:
             assert hand.joints == JOINTS
-        assert time.perf_counter() - start < 5.0
+        assert time.process_time() - start < 5.0
     return refused
 
 
