@@ -20,6 +20,12 @@ from sysid.diagnose_grid import SMOOTH_STEPS, held_targets, shares, smoothed
 GRID_S = 0.004
 """Step that a grid does not go much below [s]; slower logs keep their own."""
 
+SLOW_S = 0.03
+"""Rows further apart than this do not show what a servo does with a target [s]."""
+
+FINER = 4
+"""Steps of the grid between two rows of such a log: each row is looked at once."""
+
 MAX_FILL_S = 0.3
 """Longest stretch without a reading that is bridged by a straight line [s]."""
 
@@ -47,6 +53,7 @@ class Piece:
         held, sent: the last targets, in their order, and when they were sent before the
             end of the step [steps].
         every: readings in a step.
+        row_s: time between two readings [s].
         pos: encoder angle, smoothed.
         vel, acc: first and second derivative of `pos`.
         effort: effort in the unit of its column, smoothed; NaN if not logged.
@@ -60,6 +67,7 @@ class Piece:
     held: Float[np.ndarray, "n s j"]
     sent: Float[np.ndarray, "n s j"]
     every: int
+    row_s: float
     pos: Float[np.ndarray, "n j"]
     vel: Float[np.ndarray, "n j"]
     acc: Float[np.ndarray, "n j"]
@@ -72,6 +80,8 @@ def grid_step_s(logs: Sequence[MeasuredLog], joints: Sequence[str]) -> float:
     """Returns the step of the common grid: a whole number of sampling periods [s]."""
     names = [f"pos.{joint}" for joint in joints]
     period = max(column_timing(log, n).period_s for log in logs for n in names)
+    if period > SLOW_S:
+        return round(period / FINER, 5)
     return round(period * max(1, round(GRID_S / period)), 5)
 
 
@@ -101,7 +111,9 @@ def pieces_of(
             if len(kept) == len(parts):
                 stacked = {k: np.stack([p[k] for p in kept], -1) for k in kept[0]}
                 t_s = start + step_s * np.arange(len(stacked["pos"]))
-                pieces.append(Piece(log=index, t_s=t_s, every=every, **stacked))
+                pieces.append(
+                    Piece(index, t_s, every=every, row_s=min(periods), **stacked)
+                )
     return pieces
 
 

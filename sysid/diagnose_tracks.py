@@ -14,7 +14,7 @@ from sysid.diagnose_checks import check_records
 from sysid.diagnose_doubt import sampling_doubt, timing_doubt
 from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
 from sysid.diagnose_grid import SMOOTH_STEPS, smoothed
-from sysid.diagnose_records import Piece, grid_step_s, pieces_of
+from sysid.diagnose_records import FINER, SLOW_S, Piece, grid_step_s, pieces_of
 from sysid.mechanism import JointDrive, Mechanism
 
 
@@ -57,6 +57,13 @@ class JointTrack:
     speed_scale: float
     angle_scale: float
     acc_scale: float
+
+
+SETTLE_S = 0.4
+"""Time in which a joint follows a target that nobody has seen [s]."""
+
+REST = 0.05
+"""Share of a joint's large speeds below which it is at rest."""
 
 
 def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointTrack]:
@@ -231,11 +238,29 @@ def _valid(piece: Piece, j: int, steps: int) -> np.ndarray:
     """Tells where samples of the residual rest on readings only."""
     valid = np.zeros(steps, bool)
     valid[: len(piece.t_s)] = piece.valid[:, j]
-    settle = int(0.4 / (piece.t_s[1] - piece.t_s[0])) + 8
+    settle = int(SETTLE_S / (piece.t_s[1] - piece.t_s[0])) + 8
     bad = ~valid
     bad[:settle] = True  # the past of the target is not known
     spread = np.convolve(bad, np.ones(17), "same") > 0
-    return ~spread
+    return ~spread & _resolved(piece, j, steps)
+
+
+def _resolved(piece: Piece, j: int, steps: int) -> np.ndarray:
+    """Tells where the rows are close enough together for what happens.
+
+    Of a motion that lasts a few rows only the rests before and after it count: the
+    joint is at rest and has been told nothing new for `SETTLE_S`.
+    """
+    resolved = np.ones(steps, bool)
+    if piece.row_s > SLOW_S:
+        settle = int(SETTLE_S / (piece.t_s[1] - piece.t_s[0]))
+        told = np.diff(piece.cmd[:, j], prepend=piece.cmd[0, j]) != 0.0
+        speed = np.abs(piece.vel[:, j])
+        moves = speed > REST * np.percentile(speed, 98)
+        busy = np.convolve(told, np.ones(2 * settle + 1), "same")
+        busy += np.convolve(moves, np.ones(2 * FINER + 1), "same")
+        resolved[: len(busy)] = busy == 0
+    return resolved
 
 
 def _noise(logs, joint: str, drive, step_s: float) -> tuple[float, float]:

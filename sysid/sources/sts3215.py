@@ -7,12 +7,13 @@ Source:
 
 import csv
 import re
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 
 import numpy as np
 
-from envs.errors import InputError
+from envs.errors import InputError, one_of
 from sysid.data import MeasuredLog, make_log
 
 COUNTS_PER_TURN = 4096
@@ -30,29 +31,39 @@ _LOAD_SIGN, _SPEED_SIGN = 1 << 10, 1 << 15
 _VALID = "a telemetry file of the STS3215 data set"
 
 
-def load_sts3215(path: str | Path) -> MeasuredLog:
+def load_sts3215(path: str | Path, motors: Sequence[str] = ()) -> MeasuredLog:
     """Loads one telemetry file.
 
     Joints are named `motor1`, `motor2`, … as in the file; motors without a reading are
-    left out. The servo reports the size of its current only, so `cur` is ≥ 0.
+    left out. The servo reports the size of its current only, so `cur` is ≥ 0. A load
+    whose sign bit is set turns the servo towards larger counts, as the records show:
+    `duty` is positive then.
+
+    Args:
+        path: the file.
+        motors: numbers of the motors that are wanted; all of them if there are none.
 
     Raises:
-        InputError: not such a file; names the line.
+        InputError: not such a file, or not such a motor; names the line.
     """
     file = Path(path)
     names, rows = _read(file)
     t_s = _seconds(file, [row[0] for row in rows])
     cells = np.array([[_number(file, i, x) for x in r[1:]] for i, r in enumerate(rows)])
     table = dict(zip(names[1:], cells.T, strict=True))
-    motors = [m for name in names if (m := re.fullmatch(r"pos \((\d+)\)", name))]
-    motors = [m[1] for m in motors if not np.all(np.isnan(table[m[0]]))]
-    if not motors:
+    with_pos = [m for name in names if (m := re.fullmatch(r"pos \((\d+)\)", name))]
+    found = [m[1] for m in with_pos if not np.all(np.isnan(table[m[0]]))]
+    if not found:
         raise InputError(file, "columns", ", ".join(names), _VALID)
+    for motor in motors:
+        if motor not in found:
+            raise InputError(file, "motors", motor, one_of(found, motor))
     try:
-        columns = {k: v for m in motors for k, v in _motor(table, m).items()}
+        wanted = tuple(motors) or tuple(found)
+        columns = {k: v for m in wanted for k, v in _motor(table, m).items()}
     except KeyError as error:
         raise InputError(file, "columns", f"no {error.args[0]}", _VALID) from error
-    joints = tuple(f"motor{motor}" for motor in motors)
+    joints = tuple(f"motor{motor}" for motor in wanted)
     return make_log(joints, t_s, columns, source=str(file))
 
 
@@ -66,7 +77,7 @@ def _motor(table: dict[str, np.ndarray], motor: str) -> dict[str, np.ndarray]:
         "cmd": (raw("target pos") - HOME_COUNT) * RAD_PER_COUNT,
         "pos": (raw("pos") - HOME_COUNT) * RAD_PER_COUNT,
         "vel": _signed(raw("speed"), _SPEED_SIGN) * RAD_PER_COUNT,
-        "duty": _signed(raw("load"), _LOAD_SIGN) * DUTY_PER_COUNT,
+        "duty": -_signed(raw("load"), _LOAD_SIGN) * DUTY_PER_COUNT,
         "cur": raw("current") * AMPERE_PER_COUNT,
         "temp": raw("temp"),
     }

@@ -13,6 +13,7 @@ from envs.quiet_mujoco import mujoco
 from sysid.diagnose import examine
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 from sysid.sources.emps import load_emps
+from sysid.sources.sts3215 import RAD_PER_COUNT, load_sts3215
 from sysid.sources.xl330 import load_xl330
 
 REAL = os.environ.get("FINGERS_REAL_DATA", "")
@@ -130,3 +131,43 @@ def test_xl330_load_friction_and_limit():
     gain = said.residual_gains["position"]
     print(f"{named}: {gain.heldout_rmse_before:.4f} to {gain.heldout_rmse_after:.4f}")
     assert gain.heldout_rmse_after <= 0.055 < 0.090 < gain.heldout_rmse_before
+
+
+ARM = """
+<mujoco><worldbody><body><joint name="motor5"/>
+<inertial pos="0 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/>
+</body></worldbody></mujoco>"""
+SLOW_PATH = {
+    "slew_limit": {"speed_rad_s": Figure(400 * RAD_PER_COUNT, 0.3, free=True)},
+    "transport_delay": {"delay_s": Figure(0.1, 0.1, free=True)},
+}
+
+
+def sts3215(known_to):
+    """The servo as it answers in rest: 8 thousandths of its duty for a count."""
+    drive = JointDrive(
+        Figure(0.008 / RAD_PER_COUNT, known_to),
+        Figure(1e-6, 10.0),
+        effort="duty",
+        effects=SLOW_PATH,
+        known="controller",
+    )
+    return model_mechanism(mujoco.MjModel.from_xml_string(ARM), {"motor5": drive})
+
+
+@real
+@pytest.mark.parametrize("known_to", [0.05, 0.5])
+def test_sts3215_deadband(known_to):
+    """Ten rows a second under pulls that nobody measured: only the rests count.
+
+    There duty is 8 thousandths for a count of error beyond the first; see the file.
+    """
+    file = Path(REAL) / "sts3215_backlash" / "logs" / "motor_telemetry_single.csv"
+    log = load_sts3215(file, motors=["5"])
+    said, _ = examine([log], sts3215(known_to))
+    assert said.verdict == "found"
+    assert [c.effect for c in said.causes] == ["deadband"]
+    width = said.causes[0].parameters["half_width_rad"]
+    print(f"half width {width.value:.5f} ({width.low:.5f} to {width.high:.5f}) rad")
+    assert width.value == pytest.approx(RAD_PER_COUNT, rel=0.02)
+    assert width.low < RAD_PER_COUNT < width.high

@@ -112,7 +112,7 @@ def test_sts3215(tmp_path):
     assert log.missing("pos.motor1").tolist() == [True, False]
     assert log.column("pos.motor1")[1] == pytest.approx(-10 * RAD_PER_COUNT)
     assert log.column("vel.motor1")[1] == pytest.approx(-200 * RAD_PER_COUNT)
-    assert log.column("duty.motor1")[1] == pytest.approx(-0.150)
+    assert log.column("duty.motor1")[1] == pytest.approx(0.150)
     assert log.column("cur.motor1")[1] == pytest.approx(0.013)
 
 
@@ -129,6 +129,11 @@ def test_sts3215(tmp_path):
 def test_sts3215_that_is_refused(tmp_path, rows, match):
     with pytest.raises(InputError, match=match):
         load_sts3215(sts_file(tmp_path, *rows))
+
+
+def test_a_motor_that_the_file_lacks_is_refused(tmp_path):
+    with pytest.raises(InputError, match="motors: found 3"):
+        load_sts3215(sts_file(tmp_path, *ROWS), motors=["3"])
 
 
 @real
