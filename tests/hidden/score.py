@@ -9,6 +9,13 @@ import numpy as np
 from hidden.truth import OUTSIDE
 from scipy.stats import beta
 
+SAME_MOTION = (
+    {"encoder_offset", "mount_tilt", "payload_com"},
+    {"transport_delay", "sensor_latency"},
+)
+"""Effects that one joint on one stand moves by in the same way: gravity's torque shifts
+along the angle, or everything measured comes later. Which one is first is a toss."""
+
 
 @dataclass(frozen=True)
 class Row:
@@ -54,6 +61,13 @@ class Row:
         return {*self.causes[:1], *self.rivals} if self.causes else set()
 
     @property
+    def right(self) -> bool:
+        """Whether the effect is first, or named beside a first that moves the same."""
+        name = self.effects[0]
+        same = any({name, self.first} <= group for group in SAME_MOTION)
+        return self.first == name or (same and name in self.named)
+
+    @property
     def first(self) -> str:
         """Column of the confusion matrix."""
         return self.causes[0] if self.causes else self.verdict
@@ -97,6 +111,7 @@ def figures(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
     for strength in ("weak", "medium", "strong"):
         chosen = [r for r in single if r.strength == strength]
         result[f"first {strength}"] = _rate(r.first == r.effects[0] for r in chosen)
+        result[f"first or the same, {strength}"] = _rate(r.right for r in chosen)
     visible = [r for r in single if r.verdict != "error"]
     result["in named set"] = _rate(r.effects[0] in r.named for r in single)
     sizes = [len(r.named) for r in visible if r.named]

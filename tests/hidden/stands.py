@@ -1,7 +1,8 @@
 """Test stands: mechanisms as they are believed to be, before anything is hidden.
 
 `pendulum` is a servo with a weight, `joint` one joint of a finger of the hand, `finger`
-all four of one. The last two take the vendor's kinematics and the calibrated drive.
+all four of one, `hand` all twenty on one palm. The last three take the vendor's
+kinematics and the calibrated drive.
 """
 
 import math
@@ -13,7 +14,7 @@ from hidden.truth import Joint, Link, Mechanism
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 
-KINDS = ("pendulum", "joint", "finger")
+KINDS = ("pendulum", "joint", "finger", "hand")
 TOLERANCES = {
     "kp": 0.05,
     "kd": 0.1,
@@ -54,6 +55,8 @@ def make_stand(kind: str, rng: np.random.Generator, lowpass_hz: float = 3.0) -> 
     """Draws a stand of a kind."""
     if kind == "pendulum":
         return _pendulum(rng, lowpass_hz)
+    if kind == "hand":
+        return _hand(rng, lowpass_hz)
     finger = int(rng.integers(1, 5))
     mechanism, middle, reach = _finger(finger, rng, lowpass_hz)
     if kind == "finger":
@@ -125,6 +128,16 @@ def _finger(finger: int, rng: np.random.Generator, lowpass_hz: float):
     quat /= np.linalg.norm(quat)
     mechanism = Mechanism(tuple(links), tuple(joints), tuple(quat.tolist()))
     return mechanism, np.array(middle), np.array(reach)
+
+
+def _hand(rng: np.random.Generator, lowpass_hz: float) -> Stand:
+    fingers = [_finger(finger, rng, lowpass_hz) for finger in range(5)]
+    mechanisms = [mechanism for mechanism, _, _ in fingers]
+    links = tuple(link for m in mechanisms for link in m.links)
+    joints = tuple(joint for m in mechanisms for joint in m.joints)
+    whole = Mechanism(links, joints, mechanisms[0].base_quat_w)
+    middle, reach = (np.concatenate([f[k] for f in fingers]) for k in (1, 2))
+    return Stand("hand", whole, tuple(range(20)), middle, reach)
 
 
 def changed(mechanism: Mechanism, joint: int, figure: str, by: float) -> Mechanism:

@@ -57,6 +57,18 @@ def test_figures_of_a_right_and_of_a_wrong_diagnosis():
     assert bad["errors raised"]["rate"] == pytest.approx(1 / 6)
 
 
+def test_what_moves_the_same_counts_as_right_if_it_was_named():
+    told = row(effects=("mount_tilt",), causes=("encoder_offset",))
+    named = row(
+        effects=("mount_tilt",), causes=("encoder_offset",), rivals=("mount_tilt",)
+    )
+    other = row(effects=("deadband",), causes=("backlash",), rivals=("deadband",))
+    assert [r.right for r in (told, named, other)] == [False, True, False]
+    same = "first or the same, medium"
+    assert figures([named])[same]["rate"] == 1.0
+    assert figures([named])["first medium"]["rate"] == 0.0
+
+
 def test_upper_bound_is_that_of_the_literature():
     """No alarm in 60 records: less than 4.9 % at 95 %; the rule of three."""
     assert upper_bound(0, 60) == pytest.approx(0.0487, abs=2e-4)

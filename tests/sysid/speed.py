@@ -1,0 +1,63 @@
+"""Times a diagnosis: one joint alone, and all twenty joints of a hand.
+
+    PYTHONPATH=.:tests python tests/sysid/speed.py --kinds pendulum hand
+
+Records come from the other simulator, with backlash in one joint: 30 s at 500 Hz of the
+pendulum, 60 s at 200 Hz of the hand. Each is diagnosed twice; the first time also
+compiles. Seconds of wall clock and of CPU are printed.
+"""
+
+import argparse
+import time
+
+import numpy as np
+from hidden.believed import believed
+from hidden.recording import Recording, standard
+from hidden.sampling import Noise, record
+from hidden.stands import make_stand, slightly_wrong
+
+from sysid.diagnose import diagnose
+
+RECORDS = {"pendulum": (500.0, 10.0), "hand": (200.0, 20.0)}
+"""Rows in a second and length of a round [s]; there are three rounds."""
+
+GAP_RAD = 0.02
+
+
+def main() -> None:
+    """Runs from the command line."""
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
+    parser.add_argument("--kinds", nargs="+", choices=RECORDS, default=list(RECORDS))
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    for kind in args.kinds:
+        log, mechanism = made(kind, args.seed)
+        for time_of in ("first", "second"):
+            wall, cpu = time.perf_counter(), time.process_time()
+            said = diagnose([log], mechanism)
+            wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
+            causes = ", ".join(f"{c.effect} in {c.where}" for c in said.causes)
+            print(
+                f"{kind}, {time_of} time: {wall:.0f} s, {cpu:.0f} s of CPU; "
+                f"{said.verdict}: {causes}",
+                flush=True,
+            )
+
+
+def made(kind: str, seed: int):
+    """Returns the record and what is believed."""
+    rng = np.random.default_rng([seed, 3])
+    stand = make_stand(kind, rng)
+    rate_hz, round_s = RECORDS[kind]
+    alone = len(stand.moved) == 1
+    once = standard(rng, stand.middle, stand.reach, rate_hz, round_s, 1, alone)
+    rounds = Recording(rate_hz, np.tile(once.targets, (3, 1)), once.parts)
+    truth = slightly_wrong(stand.mechanism, rng)
+    truth = truth.with_effect(stand.moved[-1], "backlash", gap_rad=GAP_RAD)
+    quat_w = stand.mechanism.base_quat_w
+    log = record(truth, rounds, Noise(), rng, palm_quat_w=quat_w, source=kind)
+    return log, believed(stand)
+
+
+if __name__ == "__main__":
+    main()
