@@ -92,7 +92,10 @@ def _examined(
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)
     alone = not np.any(np.asarray(track.track.others_nm))
-    result = search(problem_of(track, logs, mechanism, not alone))
+    problem = problem_of(track, logs, mechanism, not alone)
+    if not problem.valid.any():  # it only moves where the rows cannot follow
+        return Examined(track, None, None)
+    result = search(problem)
     return Examined(track, result.problem, result)
 
 

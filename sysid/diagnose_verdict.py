@@ -44,7 +44,8 @@ def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict
     """Returns the fields of a `Diagnosis` that the searches decide."""
     searched = [e for e in examined if e.search is not None]
     warnings = [
-        f"{e.track.joint} does not move in these records and was not examined"
+        f"{e.track.joint} does not move in these records, or too fast for their rows, "
+        "and was not examined"
         for e in examined
         if e.search is None
     ]

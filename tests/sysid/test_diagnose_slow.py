@@ -54,3 +54,14 @@ def test_a_deadband_is_found_in_the_rests():
 def test_without_it_nothing_is_found():
     """Negative control."""
     assert not diagnose([pulled(0.0)], held()).causes
+
+
+def test_without_the_effort_nothing_can_be_said():
+    log = pulled(0.004)
+    columns = {k: v for k, v in log.columns.items() if not k.startswith("tau")}
+    drive = JointDrive(Figure(KP, 0.05), Figure(0.1, 0.1), effort="none")
+    model = mujoco.MjModel.from_xml_string(ARM)
+    mechanism = model_mechanism(model, {"servo": drive})
+    said = diagnose([make_log(("servo",), log.t_s, columns)], mechanism)
+    assert said.verdict == "not_observable"
+    assert "too fast for their rows" in said.warnings[0]
