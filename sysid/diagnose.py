@@ -96,7 +96,7 @@ def _examined(
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
     result = search(problem)
-    return Examined(track, result.problem, result)
+    return Examined(result.problem.data, result.problem, result)
 
 
 def problem_of(

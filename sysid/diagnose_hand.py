@@ -7,7 +7,6 @@ import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, HandFile, JointQuantity, Quantity
-from sysid.diagnose_tracks import neighbour
 from sysid.diagnosis import Cause, Diagnosis, Estimate
 from sysid.mechanism import Mechanism, hand_mechanism
 
@@ -54,12 +53,11 @@ def _with_cause(
         name: _within(cause.effect, name, _beside(hand, cause.effect, value), source)
         for name, value in cause.parameters.items()
     }
-    other = _neighbour_of(cause, mechanism) if cause.effect == "joint_coupling" else ""
     whole = CATALOGUE[cause.effect].scope == "hand"
     if whole and cause.effect in (effect.name for effect in hand.effects):
         return hand  # the joint that shows it best has told it
     where = "all" if whole else cause.where
-    added = Effect(cause.effect, found, (where,), other)
+    added = Effect(cause.effect, found, (where,), cause.other)
     return dataclasses.replace(hand, effects=(*hand.effects, added))
 
 
@@ -96,12 +94,6 @@ def _within(effect: str, name: str, estimate: Estimate, source: str) -> Quantity
         clipped(max(high, value)),
         note,
     )
-
-
-def _neighbour_of(cause: Cause, mechanism: Mechanism) -> str:
-    """Returns the joint whose angle pulls a coupled joint."""
-    joints = mechanism.joints
-    return joints[neighbour(mechanism.model, joints, joints.index(cause.where))]
 
 
 def _scaled(

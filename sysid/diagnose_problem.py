@@ -111,13 +111,13 @@ class Problem:
         noise, weights = [], []
         made = _autoregression if self.repeat else _correlated
         for k in range(2):
-            series, valid = self._noisy(raw[k], self.valid[k])
+            series, valid = self.differences(raw[k], self.valid[k])
             size = _bulk(series[valid]) if valid.any() else 1.0
             weights.append(1.0 / np.hypot(1.0, self.data.doubt[k] / size))
-            noise.append(made(*self._noisy(weights[k] * raw[k], self.valid[k])))
+            noise.append(made(*self.differences(weights[k] * raw[k], self.valid[k])))
         return replace(self, noise=tuple(noise), weight=np.stack(weights))
 
-    def _noisy(self, series: np.ndarray, valid: np.ndarray):
+    def differences(self, series: np.ndarray, valid: np.ndarray):
         """Returns the difference of repeats, or else the whole."""
         n = self.repeat
         if not n:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.diagnose_model import Model, fit_models, gain_nat
+from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_starts import starts_of
 
@@ -68,6 +69,7 @@ def search(problem: Problem) -> Search:
     Without repeats it runs again with what the first result leaves as noise.
     """
     problem, base = settled(problem)
+    problem = coupled(problem, base)
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found

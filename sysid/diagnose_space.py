@@ -39,6 +39,9 @@ DELAY_S = 1e-3
 MASS = 0.05
 """Largest relative deviation of masses and inertias that is no news."""
 
+ZERO_RAD = 1e-3
+"""Largest error of an encoder's zero that is no news, where none is told [rad]."""
+
 ROTOR = 1.0
 """Largest logarithm by which the motor's share of a joint's inertia may be wrong."""
 
@@ -219,6 +222,10 @@ def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Fig
     if effect == "armature" and not found:
         mean = float(np.mean(np.asarray(track.track.inertia)))
         return {"inertia_kgm2": Figure(0.0, MASS * mean)}
+    if effect == "payload_mass" and not found:
+        return {"mass_kg": Figure(0.0, MASS * float(np.mean(track.track.payload_kg)))}
+    if effect == "encoder_offset" and not found and not track.slide:
+        return {"offset_rad": Figure(0.0, ZERO_RAD)}
     return found
 
 

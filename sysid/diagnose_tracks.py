@@ -30,6 +30,8 @@ class JointTrack:
         moving: where the joint is certainly not at rest (m, p).
         doubt: about both residuals, beyond their usual noise; see `diagnose_doubt`
             [N·m] (2, m, p).
+        other: joint whose angle and effort are in the track; its own without others.
+        neighbours: angle and effort (2, t, p) of every joint that may pull on it.
         armature: part of the inertia that the model gives to the drive [kg·m²].
         log: record that a piece is from.
         start_s: time at which a piece starts [s].
@@ -46,6 +48,8 @@ class JointTrack:
     valid: Bool[np.ndarray, "m p"]
     moving: Bool[np.ndarray, "m p"]
     doubt: Float[np.ndarray, "2 m p"]
+    other: str
+    neighbours: dict[str, Float[np.ndarray, "2 t p"]]
     armature: float
     log: Int[np.ndarray, " p"]
     start_s: Float[np.ndarray, " p"]
@@ -115,8 +119,16 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     efforts = [scale * p.effort[:, j] for p in pieces]
     logged = np.array([not np.any(np.isnan(e)) for e in efforts])
     slow = [smoothed(p.vel[:, j], BAND_STEPS) for p in pieces]
-    beside = neighbour(mechanism.model, logs[0].header.joints, j)
     nm = [np.nan_to_num(scale * p.effort) for p in pieces]
+    joints = logs[0].header.joints
+    beside = neighbours(mechanism.model, joints, j)
+    pulls = {
+        joints[k]: np.stack(
+            [stack([p.pos[:, k] for p in pieces]), stack([e[:, k] for e in nm])]
+        )
+        for k in beside
+    }
+    other = joints[beside[0]]
     factor = [
         logs[p.log].header.settings.get(drive.kp_setting, 1.0)
         if drive.kp_setting
@@ -142,8 +154,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         payload_shift=stack([b.payload_shift[:, j] for b in bodies]),
         payload_inertia=stack([b.payload_inertia[:, j] for b in bodies]),
         others_nm=stack([np.abs(e).sum(1) - np.abs(e[:, j]) for e in nm]),
-        other_q=stack([p.pos[:, beside] for p in pieces]),
-        other_nm=stack([e[:, beside] for e in nm]),
+        other_q=pulls[other][0],
+        other_nm=pulls[other][1],
         gravity=np.stack([b.gravity for b in bodies]),
         payload_kg=np.array([b.payload_kg[j] for b in bodies]),
         kp=drive.kp.value * np.array(factor),
@@ -171,6 +183,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         valid=valid,
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,
         doubt=_doubt(fields, drive, step_s, rows),
+        other=other,
+        neighbours=pulls,
         armature=float(
             mechanism.model.dof_armature[mechanism.model.joint(joint).dofadr[0]]
         ),
@@ -200,17 +214,13 @@ def _alike(targets: list[np.ndarray]) -> list[np.ndarray]:
     return [np.pad(x, [(0, 0), (most - x.shape[1], 0)], "edge") for x in targets]
 
 
-def neighbour(model, joints: tuple[str, ...], j: int) -> int:
-    """Returns the joint on the parent's body, else on a child's, else itself."""
+def neighbours(model, joints: tuple[str, ...], j: int) -> list[int]:
+    """Returns the joints on the parent's body and on its children; else itself."""
     body = [int(model.jnt_bodyid[model.joint(n).id]) for n in joints]
     parents = [int(model.body_parentid[b]) for b in body]
-    for k, other in enumerate(body):
-        if other == parents[j]:
-            return k
-    for k, parent in enumerate(parents):
-        if parent == body[j]:
-            return k
-    return j
+    before = [k for k, other in enumerate(body) if other == parents[j]]
+    behind = [k for k, parent in enumerate(parents) if parent == body[j]]
+    return before + behind or [j]
 
 
 def _between(drive: JointDrive, every: int) -> bool:

@@ -7,7 +7,9 @@ import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
+from sysid.diagnose_left import left_over
 from sysid.diagnose_model import Model, gain_nat
+from sysid.diagnose_neighbour import EFFECT as PULLED
 from sysid.diagnose_problem import CHANNELS
 from sysid.diagnose_search import THRESHOLD, Search
 from sysid.diagnose_space import Slot
@@ -23,12 +25,6 @@ SURE = 3.0
 
 NEARLY = 0.015
 """Share of a cause's gain below which a gap does not decide."""
-
-EXCESS = 1.5
-"""Squared error over the noise above which something may be left to explain."""
-
-LEFT = 0.15
-"""Share of the removable squared error that a whole explanation may leave."""
 
 SEEN = 12.0
 """Gain from which on an effect counts as seen [nat]."""
@@ -55,7 +51,7 @@ def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict
     causes = _causes(searched, mechanism)
     warnings += [w for e in searched for w in warnings_of(e.search)]
     blind = _blind(searched)
-    left = [text for e in searched for text in _left(e)]
+    left = [text for e in searched for text in left_over(e.search)]
     first = _leading(searched, causes)
     gain = _main(gains[first.track.joint]) if causes else None
     rivals = _alternatives(first.search) if causes else ()
@@ -119,10 +115,15 @@ def _causes(searched, mechanism: Mechanism) -> list[Cause]:
     causes = []
     for effect, members in by_effect.items():
         joints = tuple(e.track.joint for e in members)
-        for where, inside in _places(joints, mechanism, searched):
+        places = _places(joints, mechanism, searched)
+        if effect == PULLED:  # each has another joint that pulls
+            places = [(joint, (joint,)) for joint in joints]
+        for where, inside in places:
             chosen = [e for e in members if e.track.joint in inside]
             evidence = sum(_evidence(e.search, effect) for e in chosen)
-            causes.append(Cause(effect, where, _pooled(chosen, effect), evidence))
+            other = chosen[0].track.other if effect == PULLED else ""
+            found = _pooled(chosen, effect)
+            causes.append(Cause(effect, where, found, evidence, other))
     return sorted(causes, key=lambda c: -c.evidence)
 
 
@@ -284,20 +285,6 @@ def _matters(slot: Slot) -> float:
         grid = [u for u in slot.starts if u > 0.0]
         return slot.base + sorted(grid)[len(grid) // 2]
     return slot.base + 0.1
-
-
-def _left(examined) -> list[str]:
-    """Tells where an error remains that no effect explains."""
-    found, texts = examined.search, []
-    for k, name in enumerate(CHANNELS):
-        before, after = found.base.errors[k], found.best.errors[k]
-        if after > EXCESS and after - 1.0 > LEFT * (before - 1.0):
-            times = np.sqrt(after)
-            texts.append(
-                f"{examined.track.joint}: the {name} residual is {times:.1f} times the "
-                "noise"
-            )
-    return texts
 
 
 def _main(gains: dict[str, Gain]) -> Gain:

@@ -26,12 +26,14 @@ class Cause:
         where: a joint, or `flexion`, `abduction`, `pip`, `dip`, a finger, `all`.
         parameters: estimates by parameter name.
         evidence: gain in log predictive density on held-out data [nat].
+        other: the joint that pulls a coupled one; "" for all other effects.
     """
 
     effect: str
     where: str
     parameters: dict[str, Estimate]
     evidence: float
+    other: str = ""
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ def true_parameters(case: Case, effect: str) -> dict[str, float]:
         upright = case.stand.kind == "pendulum"
         return {"pitch_rad": -values["angle_rad"]} if upright else {}
     if effect == "payload_mass":
-        return {"mass_kg": case.truth.payload_kg[index]}
+        return {"mass_kg": case.truth.payload_kg[-1]}
     if effect in _TRANSLATED:
         return _TRANSLATED[effect](values, true, believed_)
     return dict(values)

@@ -17,8 +17,8 @@ from hidden.truth import OUTSIDE, Mechanism
 from sysid.data import MeasuredLog
 
 RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
-SLOW = ("thermal_derating", "clock_drift")
-"""Effects that a single round does not show."""
+SLOW = ("thermal_derating", "clock_drift", "packet_reorder")
+"""Effects that a single round does not show, or not as the others do."""
 
 
 @dataclass(frozen=True)
@@ -167,18 +167,21 @@ class _Finder:
         """Finds the size for a ratio; returns it with the ratio that it reaches.
 
         The excess error grows about with the square of the size, which gives the next
-        guess inside a bracket.
+        guess inside a bracket. Where it jumps, the nearest of all guesses counts.
         """
         low, high = self.scale.low, self.scale.high
         size = math.sqrt(low * high)
+        tried = []
         for _ in range(9):
             reached = self.ratio(size)
             short = (target**2 - 1.0) / max(reached**2 - 1.0, 1e-9)
-            if abs(math.log(short)) < 0.1:
+            tried.append((abs(math.log(short)), size, reached))
+            if tried[-1][0] < 0.1:
                 break
             low, high = (size, high) if short > 1.0 else (low, size)
             guess = size * min(max(short, 1e-6), 1e6) ** 0.5
             size = guess if low < guess < high else math.sqrt(low * high)
+        _, size, reached = min(tried)
         if size < self.scale.least:
             return self.scale.least, self.ratio(self.scale.least)
         return size, reached

@@ -50,7 +50,7 @@ class JointDrive:
         self.bend = 0.5 * value("asymmetric_viscous", "difference_nms", 0.0)
         self.viscous = value("viscous_friction", "damping_nms", 0.0)
         self.input = self.filtered = self.command = self._quantized(targets[0])
-        self.torque = 0.0
+        self.asked = self.torque = 0.0
         self.order = _reordered(joint, times)
 
     def _quantized(self, target: float) -> float:
@@ -83,14 +83,14 @@ class JointDrive:
         error = self.command - self.encoder(q)
         if self.zone:
             error -= min(max(error, -self.zone), self.zone)
-        strength /= 1.0 + self.warmth
-        torque = self.kp * error - self.kd * self._encoder_speed(q, v)
-        torque *= strength
-        torque = min(max(torque, -self.limit), self.limit)
+        asked = self.kp * error - self.kd * self._encoder_speed(q, v)
+        asked = min(max(asked, -self.limit), self.limit)
         if self.slope < math.inf:
             rise = self.slope * self.h
-            torque = self.torque + min(max(torque - self.torque, -rise), rise)
-        self.torque = torque
+            asked = self.asked + min(max(asked - self.asked, -rise), rise)
+        self.asked = asked
+        # A warm winding and a low supply weaken what the servo asks for, limit and all.
+        self.torque = torque = asked * strength / (1.0 + self.warmth)
         if self.heat:
             self.warmth += self.h * (self.heat * torque**2 - self.cool * self.warmth)
         return torque

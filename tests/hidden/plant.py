@@ -43,8 +43,12 @@ def build(mechanism: Mechanism, step_s: float = STEP_S) -> Plant:
     base = spec.worldbody.add_body(name="base", quat=mechanism.base_quat_w)
     bodies = {"world": base}
     extra = mechanism.payload_kg or (0.0,) * len(mechanism.links)
+    last = mechanism.links[-1]
     for link, joint, mass in zip(mechanism.links, mechanism.joints, extra, strict=True):
-        bodies[link.name] = _add(spec, bodies[link.parent], link, joint, mass)
+        body = _add(spec, bodies[link.parent], link, joint, mass)
+        if link is last:
+            body.ipos = np.add(link.com, [mechanism.payload_shift_m, 0.0, 0.0])
+        bodies[link.name] = body
     model = spec.compile()
     names = [link.name for link in mechanism.links]
     rotors = [model.joint(_motor_of(m, model)).id for m in names]
@@ -73,9 +77,8 @@ def _add(spec, parent, link: Link, joint: Joint, extra_kg: float):
     """Adds a link with its hinge, and its rotor where something is between."""
     body = parent.add_body(name=link.name, pos=link.pos, quat=link.quat)
     mass = link.mass + extra_kg
-    shift = joint.value("payload_com", "shift_m", 0.0)
     body.mass = mass
-    body.ipos = np.add(link.com, [shift, 0.0, 0.0])
+    body.ipos = link.com
     body.iquat = link.inertia_quat
     body.inertia = np.multiply(link.inertia, mass / link.mass)
     body.explicitinertial = True

@@ -100,11 +100,19 @@ def _eccentricity(mechanism, joint, size, rng):
 
 
 def _payload(mechanism, joint, size, rng):
+    """The last link carries the load, whichever joint feels it."""
     masses = list(mechanism.payload_kg or (0.0,) * len(mechanism.links))
-    masses[joint] += size * mechanism.links[joint].mass
+    added = size * mechanism.links[-1].mass
+    masses[-1] += added
     hidden = replace(mechanism, payload_kg=tuple(masses))
-    added = size * mechanism.links[joint].mass
     return hidden.with_effect(joint, "payload_mass", mass_kg=added)
+
+
+def _shift(mechanism, joint, size, rng):
+    """The load of the last link lies elsewhere."""
+    shift = size * _sign(rng)
+    hidden = replace(mechanism, payload_shift_m=shift)
+    return hidden.with_effect(joint, "payload_com", shift_m=shift)
 
 
 def _tilt(mechanism, joint, size, rng):
@@ -227,7 +235,7 @@ SCALES: dict[str, Scale] = {
     "sensor_latency": Scale(_effect("sensor_latency", latency_s=_size), 1e-4, 0.08),
     "clock_drift": Scale(_effect("clock_drift", drift=_signed), 1e-5, 0.02),
     "payload_mass": Scale(_payload, 1e-2, 10.0, "mass", 0.2),
-    "payload_com": Scale(_effect("payload_com", shift_m=_signed), 1e-4, 0.1),
+    "payload_com": Scale(_shift, 1e-4, 0.1),
     "mount_tilt": Scale(_tilt, 1e-3, 0.6),
     "gear_ripple": Scale(
         _effect(

@@ -64,6 +64,7 @@ class Mechanism:
         links, joints: in the same order, one joint for each link.
         base_quat_w: orientation of the base (w, x, y, z).
         payload_kg: mass added to each link, at its centre of mass.
+        payload_shift_m: way of the last link's centre of mass along its x.
         tilt_rad: turns of gravity about the world's x and y that nobody knows of.
         sag_ohm: volts lost per newton metre of all drives together.
     """
@@ -72,6 +73,7 @@ class Mechanism:
     joints: tuple[Joint, ...]
     base_quat_w: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     payload_kg: tuple[float, ...] = ()
+    payload_shift_m: float = 0.0
     tilt_rad: tuple[float, float] = (0.0, 0.0)
     sag_per_nm: float = 0.0
 

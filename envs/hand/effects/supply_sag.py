@@ -24,9 +24,7 @@ EFFECT = EffectKind(
     name="supply_sag",
     equation="τ' = τ / (1 + s Σ_i |τ_i|), over all joints on the supply",
     parameters={
-        "sag_per_nm": Parameter(
-            "1/(N·m)", 0.0, 10.0, lognormal(0.05, 4.0), identity=0.0
-        )
+        "sag_per_nm": Parameter("1/(N·m)", 0.0, 1e3, lognormal(0.05, 4.0), identity=0.0)
     },
     acts={Stage.TORQUE: _act},
     confusable_with={

@@ -23,7 +23,7 @@ EFFECT = EffectKind(
     equation="τ' = τ / (1 + w), T ẇ = k τ'² − w; cold at the start",
     parameters={
         "loss_per_nm2": Parameter(
-            "1/(N·m)²", 0.0, 1e3, lognormal(1.0, 4.0), identity=0.0
+            "1/(N·m)²", 0.0, 1e6, lognormal(1.0, 4.0), identity=0.0
         ),
         "time_constant_s": Parameter("s", 1.0, 2000.0, lognormal(60.0, 3.0)),
     },

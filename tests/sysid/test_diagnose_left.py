@@ -1,0 +1,112 @@
+"""Neighbours that pull, repeats under jitter, and what named causes leave."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hidden.believed import believed
+from hidden.cases import draw_case
+from hidden.recording import standard
+from hidden.sampling import Noise, record
+from hidden.stands import make_stand
+
+from sysid.data import make_log
+from sysid.diagnose import problem_of
+from sysid.diagnose_left import left_over
+from sysid.diagnose_model import fit_models
+from sysid.diagnose_neighbour import beside, coupled
+from sysid.diagnose_records import grid_step_s
+from sysid.diagnose_search import Search, settled
+from sysid.diagnose_tracks import all_tracks
+
+
+@pytest.fixture(scope="module")
+def searched():
+    """A joint without any effect, and its problem."""
+    case = draw_case(17, kind="pendulum", round_s=6.0)
+    mechanism, logs = believed(case.stand), list(case.logs)
+    problem = problem_of(all_tracks(logs, mechanism)[0], logs, mechanism, False)
+    problem, base = settled(problem)
+    samples = int(problem.counts().sum())
+    return Search(problem, base, base, {}, {}, samples)
+
+
+@pytest.mark.parametrize("other", [0, 2])
+def test_a_joint_is_pulled_from_below_or_above(other):
+    rng = np.random.default_rng(3)
+    stand = make_stand("finger", rng)
+    once = standard(rng, stand.middle, stand.reach, 200.0, 6.0, 1, False)
+    truth = stand.mechanism.with_effect(
+        1, "joint_coupling", other=other, stiffness_nm_rad=0.05
+    )
+    log = record(truth, once, Noise(), rng, palm_quat_w=stand.mechanism.base_quat_w)
+    mechanism, names = believed(stand), stand.names
+    track = all_tracks([log], mechanism)[1]
+    assert list(track.neighbours) == [names[0], names[2]]
+    problem, base = settled(problem_of(track, [log], mechanism, True))
+    found = coupled(problem, base).data
+    assert found.other == names[other]
+    assert np.asarray(found.track.other_q)[:, 0] == pytest.approx(
+        np.asarray(beside(track, names[other]).track.other_q)[:, 0]
+    )
+
+
+def test_jitter_does_not_widen_the_grid():
+    """The median of these steps is 5.01 ms, and repeats would be missed."""
+    steps = np.resize([0.00501, 0.00501, 0.00501, 0.00497], 4000)
+    t_s = np.concatenate([[0.0], np.cumsum(steps)])
+    t_s = np.delete(t_s, [500, 1500])
+    columns = {"cmd.a": np.sin(t_s), "pos.a": np.sin(t_s)}
+    assert grid_step_s([make_log(("a",), t_s, columns)], ["a"]) == 0.005
+
+
+def test_nothing_is_left_of_a_joint_without_effects(searched):
+    assert left_over(searched) == []
+
+
+def test_an_error_common_to_the_repeats_is_left(searched):
+    wrong = replace(searched.best, errors=np.array([1.0, 2.6]))
+    before = replace(searched.best, errors=np.array([1.0, 16.0]))
+    left = left_over(replace(searched, base=before, best=wrong))
+    assert len(left) == 1
+    assert "mechanics residual" in left[0]
+    right = replace(searched.best, errors=np.array([1.0, 1.6]))
+    assert left_over(replace(searched, base=before, best=right)) == []
+
+
+def test_sizes_at_the_end_of_their_range_explain_nothing(searched):
+    problem = searched.problem
+    (i,) = problem.space.of("encoder_scale")
+    model = fit_models(problem, [("encoder_scale",)], [searched.base.fit.theta])[0]
+    assert left_over(replace(searched, best=model)) == []
+    theta = model.fit.theta.copy()
+    theta[i] = problem.space.slots[i].high
+    edge = replace(model, fit=replace(model.fit, theta=theta, bounded=(i,)))
+    assert (
+        "encoder_scale.scale met its bound"
+        in left_over(replace(searched, best=edge))[0]
+    )
+
+
+def test_a_cause_that_bends_a_figure_is_not_all(searched):
+    problem = searched.problem
+    (i,) = problem.space.of("stiffness")
+    model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
+    theta = model.fit.theta.copy()
+    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
+    bent = replace(model, fit=replace(model.fit, theta=theta))
+    left = left_over(replace(searched, best=bent))
+    assert any("stiffness.scale lies 6" in text for text in left)
+
+
+def test_jumps_that_do_not_repeat_are_not_noise(searched):
+    problem = searched.problem
+    jumps = np.zeros_like(np.asarray(problem.data.track.effort))
+    rows = np.flatnonzero(problem.valid[0][:, 0])[[200, 700]] * 4 + 8
+    for row in rows:
+        jumps[row - 8 : row + 9] += 20.0 * problem.noise[0].deviation
+    track = problem.data.track
+    effort = (np.asarray(track.effort) + jumps).astype(np.float32)
+    data = replace(problem.data, track=track.replace(effort=effort))
+    left = left_over(replace(searched, problem=replace(problem, data=data)))
+    assert any("controller residual has jumps" in text for text in left)
