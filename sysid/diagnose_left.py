@@ -23,9 +23,9 @@ from sysid.diagnose_space import Slot
 EXCESS = 1.5
 """Squared error over the noise above which something may be left to explain."""
 
-LEFT = 0.06
+LEFT = 0.1
 """Share of the removable squared error that a whole explanation may leave: its equation
-is right to a quarter of its trace."""
+is right to a third of its trace."""
 
 BENT = 5.0
 """Prior deviations from its figure at which a nuisance is no longer believed."""

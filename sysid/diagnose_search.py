@@ -30,6 +30,13 @@ LEAST_SHARE = 0.03
 ALIKE = 0.003
 """Share of a gain that does not decide between two effects."""
 
+NESTED = {"coulomb_friction": ("stribeck_friction", "hysteresis")}
+"""Effects that become another one at an end of their shape: they are not its rivals."""
+
+NEARLY = 0.015
+"""Share of a gain that does not decide between an effect and one that becomes it: what
+gives in dry friction before it slips is less than an encoder tells."""
+
 THRESHOLD = 18.0
 """Least gain of a cause in the logarithm of the predictive density [nat]."""
 
@@ -192,8 +199,12 @@ def _simplest_first(
         return stage
     samples = int(problem.counts().sum())
     gains = {m.effects: gain_nat(smaller, m, samples) for m in stage}
-    most = gains[stage[0].effects]
-    tied = [m for m in stage if most - gains[m.effects] < max(3.0, ALIKE * most)]
+    most, best = gains[stage[0].effects], stage[0].effects[-1]
+
+    def close(m: Model) -> float:
+        return NEARLY if best in NESTED.get(m.effects[-1], ()) else ALIKE
+
+    tied = [m for m in stage if most - gains[m.effects] < max(3.0, close(m) * most)]
     first = min(
         tied, key=lambda m: (len(problem.space.of(m.effects[-1])), -gains[m.effects])
     )

@@ -11,7 +11,7 @@ from sysid.diagnose_left import left_over
 from sysid.diagnose_model import Model, gain_nat
 from sysid.diagnose_neighbour import EFFECT as PULLED
 from sysid.diagnose_problem import CHANNELS
-from sysid.diagnose_search import THRESHOLD, Search
+from sysid.diagnose_search import NEARLY, NESTED, THRESHOLD, Search
 from sysid.diagnose_space import Slot
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
@@ -23,17 +23,12 @@ WIDER = 2.0
 SURE = 3.0
 """Gap below which two effects cannot be told apart [nat]."""
 
-NEARLY = 0.015
-"""Share of a cause's gain below which a gap does not decide."""
 
 SEEN = 12.0
 """Gain from which on an effect counts as seen [nat]."""
 
 DARK = 0.6
 """Share of the effects that records must hide to tell nothing."""
-
-NESTED = {"coulomb_friction": ("stribeck_friction", "hysteresis")}
-"""Effects that become another one at an end of their shape: they are not its rivals."""
 
 
 def verdict_of(examined: Sequence[Any], mechanism: Mechanism, seed: int) -> dict:
