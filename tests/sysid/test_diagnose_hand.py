@@ -16,7 +16,8 @@ HAND = load_hand_file()
 def diagnosis(effect, where="finger2_joint3", **values):
     units = CATALOGUE[effect].units()
     found = {k: Estimate(v, 0.9 * v, 1.1 * v, units[k]) for k, v in values.items()}
-    cause = Cause(effect, where, found, 100.0)
+    other = "finger2_joint4" if effect == "joint_coupling" else ""
+    cause = Cause(effect, where, found, 100.0, other)
     return Diagnosis("found", (cause,), (), None, "", ("ab" * 32,), 0, 1.0)
 
 
@@ -35,6 +36,7 @@ def test_written_and_read(effect, tmp_path):
     save_hand_file(hand, tmp_path / "hand.yaml")
     assert load_hand_file(tmp_path / "hand.yaml") == hand
     assert "identified from abab" in (tmp_path / "hand.yaml").read_text()
+    assert hand.effects[-1:] == () or hand.effects[-1].other == found.causes[0].other
 
 
 def test_figures_of_the_joint_change():
