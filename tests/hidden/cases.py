@@ -2,10 +2,11 @@
 
 Visibility is the error on the recording that the believed model makes at best, over
 noise: believed figures are first moved within their tolerances as far as that helps.
+The beginning does not count: how a joint stands before the first target is not known.
 """
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from hidden.recording import Recording, standard
@@ -19,6 +20,9 @@ from sysid.data import MeasuredLog
 RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
 SLOW = ("thermal_derating", "clock_drift", "packet_reorder")
 """Effects that a single round does not show, or not as the others do."""
+
+SETTLED_S = 0.5
+"""Time after which a record does not depend on how the joint stood before [s]."""
 
 
 @dataclass(frozen=True)
@@ -78,12 +82,11 @@ def draw_case(
     )
     truth = base = slightly_wrong(stand.mechanism, rng)
     joint = int(rng.choice(stand.moved))
+    if magnitude == "invisible":
+        stand, truth = _out_of_reach(stand, base, joint, once, rng)
     ratio = 1.0
     shapes = int(rng.integers(2**31))
-    for index, name in enumerate(effects):
-        if magnitude == "invisible":
-            truth = _out_of_reach(truth, base, joint, once, rng)
-            continue
+    for index, name in enumerate(effects if magnitude != "invisible" else ()):
         find = _Finder(stand, base, joint, name, once, noise, shapes + index)
         size, ratio = find.size(RATIOS[magnitude])
         truth = find.hidden(truth, size)
@@ -110,12 +113,26 @@ def _parts(once: Recording, rounds: int):
     )
 
 
-def _out_of_reach(truth, base, joint, once, rng) -> Mechanism:
-    """Adds a torque limit above all that the motion asks for."""
+def _out_of_reach(stand, base, joint, once, rng) -> tuple[Stand, Mechanism]:
+    """Adds a torque limit above all that the motion asks for.
+
+    The believed limit is higher still: otherwise it would be the one that acts, and
+    what is hidden would not be there at all.
+    """
+    free = _limited(base, joint, math.inf)
     times = np.arange(len(once.targets)) / once.rate_hz
-    _, torque, _ = exact(base, once, times)
-    limit = rng.uniform(1.5, 3.0) * float(np.max(np.abs(torque[:, joint])))
-    return truth.with_effect(joint, "torque_limit", limit_nm=limit)
+    most = float(np.max(np.abs(exact(free, once, times)[1][:, joint])))
+    limit = rng.uniform(1.5, 3.0) * most
+    believed = max(4.0 * most, stand.mechanism.joints[joint].limit_nm)
+    stand = replace(stand, mechanism=_limited(stand.mechanism, joint, believed))
+    truth = _limited(base, joint, believed)
+    return stand, truth.with_effect(joint, "torque_limit", limit_nm=limit)
+
+
+def _limited(mechanism: Mechanism, joint: int, limit_nm: float) -> Mechanism:
+    """The mechanism with another torque limit of a joint."""
+    changed_ = replace(mechanism.joints[joint], limit_nm=limit_nm)
+    return mechanism.with_joint(joint, changed_)
 
 
 class _Finder:
@@ -140,7 +157,8 @@ class _Finder:
     def _seen(self, mechanism: Mechanism) -> np.ndarray:
         """Angles and torques of the recorded joints, in deviations of their noise."""
         angle, torque, _ = exact(mechanism, self.recording, self.times)
-        parts = (angle[:, self.moved], torque[:, self.moved])
+        kept = self.times > SETTLED_S
+        parts = (angle[kept][:, self.moved], torque[kept][:, self.moved])
         scaled = [x / s for x, s in zip(parts, self.sigma, strict=True)]
         return np.concatenate([x.ravel() for x in scaled])
 

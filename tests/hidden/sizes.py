@@ -18,7 +18,7 @@ class Scale:
         apply: (mechanism, joint, size, generator of shapes) -> with the effect.
         low, high: sizes to search.
         release: believed figure that the effect is a change of, "" if none.
-        least: smallest size that is more than a tolerance.
+        least: smallest size that is more than a tolerance: four of them.
         kinds: stands that can show it.
     """
 
@@ -75,6 +75,11 @@ def _slope(mechanism, joint, size, rng):
     """As if the error could grow by 20 rad/s at size 1."""
     slope = 20.0 * mechanism.joints[joint].kp / size
     return mechanism.with_effect(joint, "torque_slope_limit", slope_nm_s=slope)
+
+
+def _rotor(mechanism, joint, size, rng):
+    inertia = size * mechanism.joints[joint].armature
+    return mechanism.with_effect(joint, "armature", inertia_kgm2=inertia)
 
 
 def _compliance(mechanism, joint, size, rng):
@@ -184,7 +189,7 @@ SCALES: dict[str, Scale] = {
     "damping": Scale(_effect("damping", scale=_factor), 1e-2, 1.2, "kd", 0.4),
     "deadband": Scale(_effect("deadband", half_width_rad=_size), 1e-4, 0.1),
     "torque_limit": Scale(
-        _below("torque_limit", "limit_nm", "limit_nm", 2.0), 1.0, 100.0
+        _below("torque_limit", "limit_nm", "limit_nm", 2.0), 1.0, 100.0, least=1.2
     ),
     "thermal_derating": Scale(
         _effect(
@@ -224,15 +229,16 @@ SCALES: dict[str, Scale] = {
         1e-3,
         1.0,
     ),
-    "armature": Scale(
-        _effect("armature", inertia_kgm2=_size), 1e-6, 0.02, "armature", 0.0
-    ),
+    "armature": Scale(_rotor, 1e-2, 20.0, "armature", 0.2),
     "encoder_offset": Scale(
         _effect("encoder_offset", offset_rad=_signed), 1e-3, 0.5, "offset_rad", 0.004
     ),
     "encoder_scale": Scale(_effect("encoder_scale", scale=_factor), 1e-3, 0.5),
     "encoder_eccentricity": Scale(_eccentricity, 1e-3, 0.2),
-    "sensor_latency": Scale(_effect("sensor_latency", latency_s=_size), 1e-4, 0.08),
+    # Readings that are late look exactly like targets that come late.
+    "sensor_latency": Scale(
+        _effect("sensor_latency", latency_s=_size), 1e-4, 0.08, "delay_s", 0.004
+    ),
     "clock_drift": Scale(_effect("clock_drift", drift=_signed), 1e-5, 0.02),
     "payload_mass": Scale(_payload, 1e-2, 10.0, "mass", 0.2),
     "payload_com": Scale(_shift, 1e-4, 0.1),
