@@ -66,7 +66,8 @@ class Track:
         kp, kd: nominal gains by piece.
         measured: 1 where the logged effort enters the gears, else 0 (p).
         between: 1 where the command's ripple hides between the readings, else 0.
-        noise: noise of angle, its two derivatives and effort in the residuals' band.
+        noise: noise of angle, its two derivatives and effort in both residuals, behind
+            their band and what whitens them.
     """
 
     cmd: Float[Array, "t p"]
@@ -95,7 +96,7 @@ class Track:
     kd: Float[Array, " p"]
     measured: Float[Array, " p"]
     between: Float[Array, ""]
-    noise: Float[Array, "4"]
+    noise: Float[Array, "2 4"]
 
 
 _STEPWISE = tuple(
@@ -284,17 +285,20 @@ def _between(params, rotor):
 
 def _loudness(track, now, x, gain, inertia):
     """Noise of the residuals of a candidate, and as the simulation stands [N·m]."""
-    angle, speed, acc, effort = (track.noise[k] for k in range(4))
     kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
-    # A servo at its limit does not answer to the noise of the angle.
-    servo = x.follows * jnp.hypot(x.kp * angle, x.kd * speed) / gain
-    usual_servo = jnp.hypot(kp * angle, kd * speed)
+    servo, usual_servo = [], []
+    for angle, speed, _, _ in track.noise:
+        # A servo at its limit does not answer to the noise of the angle.
+        servo.append(x.follows * jnp.hypot(x.kp * angle, x.kd * speed) / gain)
+        usual_servo.append(jnp.hypot(kp * angle, kd * speed))
+    _, speed, acc, effort = track.noise[1]
     own = jnp.hypot(inertia * acc, x.viscous * speed) / gain
     usual_own = now["inertia"] * acc
-    enters = servo + measured * (effort - servo)
-    usual_enters = usual_servo + measured * (effort - usual_servo)
-    loud = (jnp.hypot(servo, effort), jnp.hypot(own, enters))
-    usual = (jnp.hypot(usual_servo, effort), jnp.hypot(usual_own, usual_enters))
+    enters = servo[1] + measured * (effort - servo[1])
+    usual_enters = usual_servo[1] + measured * (effort - usual_servo[1])
+    told = track.noise[0, 3]
+    loud = (jnp.hypot(servo[0], told), jnp.hypot(own, enters))
+    usual = (jnp.hypot(usual_servo[0], told), jnp.hypot(usual_own, usual_enters))
     return loud, usual
 
 

@@ -9,13 +9,14 @@ beforehand: what a candidate leaves counts as noise, with its correlation in tim
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from sysid.data import MeasuredLog
 from sysid.diagnose_forced import EVERY, forced_residuals, sample_rows
 from sysid.diagnose_space import Space
-from sysid.diagnose_tracks import JointTrack
+from sysid.diagnose_tracks import JointTrack, band_noise
 
 ORDER = 4
 LANES = 64
@@ -115,7 +116,16 @@ class Problem:
             size = _bulk(series[valid]) if valid.any() else 1.0
             weights.append(1.0 / np.hypot(1.0, self.data.doubt[k] / size))
             noise.append(made(*self.differences(weights[k] * raw[k], self.valid[k])))
-        return replace(self, noise=tuple(noise), weight=np.stack(weights))
+        data = self.data
+        loud = [band_noise(data.noise, data.dt, n.a) for n in noise]
+        told = jnp.asarray(np.stack(loud), jnp.float32)
+        track = replace(data.track, noise=told)
+        return replace(
+            self,
+            data=replace(data, track=track),
+            noise=tuple(noise),
+            weight=np.stack(weights),
+        )
 
     def differences(self, series: np.ndarray, valid: np.ndarray):
         """Returns the difference of repeats, or else the whole."""

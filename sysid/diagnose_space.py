@@ -220,8 +220,10 @@ def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Fig
         return {"scale": replace(drive.kd, value=1.0)}
     found = drive.effects.get(effect, {})
     if effect == "armature" and not found:
-        mean = float(np.mean(np.asarray(track.track.inertia)))
-        return {"inertia_kgm2": Figure(0.0, MASS * mean)}
+        # Masses scale all of it; drive and links may be wrong in opposite ways.
+        known = math.sqrt(2.0) * track.armature
+        inertia = known or float(np.mean(np.asarray(track.track.inertia)))
+        return {"inertia_kgm2": Figure(0.0, MASS * inertia)}
     if effect == "payload_mass" and not found:
         return {"mass_kg": Figure(0.0, MASS * float(np.mean(track.track.payload_kg)))}
     if effect == "encoder_offset" and not found and not track.slide:

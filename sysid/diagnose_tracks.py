@@ -12,7 +12,7 @@ from sysid.data import MeasuredLog
 from sysid.diagnose_bodies import bodies_along
 from sysid.diagnose_checks import check_records
 from sysid.diagnose_doubt import sampling_doubt, timing_doubt
-from sysid.diagnose_forced import BAND_STEPS, Track, sample_rows
+from sysid.diagnose_forced import BAND_STEPS, EVERY, Track, sample_rows
 from sysid.diagnose_grid import SMOOTH_STEPS, smoothed
 from sysid.diagnose_records import FINER, SLOW_S, Piece, grid_step_s, pieces_of
 from sysid.mechanism import JointDrive, Mechanism
@@ -162,7 +162,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         kd=drive.kd.value * np.ones(len(pieces)),
         measured=logged.astype(float),
         between=np.array(float(_between(drive, pieces[0].every))),
-        noise=np.zeros(4),
+        noise=np.zeros((2, 4)),
     )
     rows = sample_rows(steps)
     valid = np.stack([_valid(p, j, steps) for p in pieces], 1)[rows]
@@ -173,8 +173,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     )  # fmt: skip
     vel = np.concatenate(slow)
     speed = float(np.percentile(np.abs(vel), 98))
-    loud = _band_noise(noise, step_s)
-    fields["noise"] = np.array(loud)
+    loud = band_noise(noise, step_s)
+    fields["noise"] = np.stack([loud, loud])
     at_rest = max(4.0 * loud[1], 0.01 * speed, 1e-9)
     return JointTrack(
         joint=joint,
@@ -299,14 +299,26 @@ def _rough(t_s: np.ndarray, x: np.ndarray, step_s: float) -> float:
     return size * np.sqrt(min(period / step_s, 1.0))
 
 
-def _band_noise(noise: tuple[float, float], step_s: float) -> tuple[float, ...]:
+def band_noise(
+    noise: tuple[float, float], step_s: float, whitening: Sequence[float] = ()
+) -> Float[np.ndarray, "4"]:
     """Noise in the band of the residuals: angle, speed, acceleration, effort.
 
-    White noise through a Gaussian of width w and its derivatives has the variances
-    1 / 2√π w, 1 / 4√π w³ and 3 / 8√π w⁵ of one sample's.
+    White noise of variance σ² in every step h passes a Gaussian of width w, k
+    derivatives, and the filter that makes a residual's noise white:
+
+        σ_k² = (σ² h / π) ∫₀^{π/h} ω²ᵏ exp(−(ω w h)²) |1 − Σ a_n e^{−iω n E h}|² dω
+
+    Args:
+        noise: deviations of angle and effort at the steps of the grid.
+        step_s: h [s].
+        whitening: a_n, at every E-th step.
     """
-    w, root = np.hypot(BAND_STEPS, SMOOTH_STEPS), np.sqrt(np.pi)
-    angle = noise[0] * np.sqrt(0.5 / root / w)
-    speed = noise[0] * np.sqrt(0.25 / root / w**3) / step_s
-    acc = noise[0] * np.sqrt(0.375 / root / w**5) / step_s**2
-    return angle, speed, acc, noise[1] * np.sqrt(0.5 / root / w)
+    w = np.hypot(BAND_STEPS, SMOOTH_STEPS)
+    omega = np.linspace(0.0, np.pi, 513)
+    lags = EVERY * np.arange(1, len(whitening) + 1)
+    passed = 1.0 - np.exp(-1j * np.outer(omega, lags)) @ np.asarray(whitening, float)
+    power = np.exp(-((omega * w) ** 2)) * np.abs(passed) ** 2
+    size = [np.sqrt(np.trapezoid(omega**k * power, omega) / np.pi) for k in (0, 2, 4)]
+    angle, speed, acc = noise[0] * np.array(size) / step_s ** np.arange(3)
+    return np.array([angle, speed, acc, noise[1] * size[0]])

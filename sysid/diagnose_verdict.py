@@ -270,6 +270,9 @@ def _shapes(effect: str) -> set[str]:
 
 def _matters(slot: Slot) -> float:
     """Coordinate of the smallest size that would matter."""
+    if slot.effect == "torque_limit":
+        # Loads ask for more torque than these records did: a limit matters above it.
+        return 0.9 * slot.base
     if slot.kind == "reciprocal":
         return 1.1 * slot.base if slot.base > 0.0 else 1.1
     if slot.kind == "log":
