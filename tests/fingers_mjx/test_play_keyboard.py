@@ -100,6 +100,10 @@ def test_what_cannot_be_pressed_is_refused(given, task, sentence):
         keys_asked(options(**given), of_task(task))
 
 
+DEEPER = 1.2
+"""Share of the way down: 2 mm more, since a key that is just closed opens by itself."""
+
+
 class Scripted:
     """In the place of a policy: joint targets from inverse kinematics."""
 
@@ -115,7 +119,8 @@ class Scripted:
         self.idle = 0 if len(asked) else self.idle + 1
         if len(asked):
             self.last = ARROWS[asked[0]]
-            goal[JOINTS] = self.rig.goals[self.last]
+            above, press = (x[self.last] for x in (self.rig.above, self.rig.goals))
+            goal[JOINTS] = above + DEEPER * (press - above)
         elif self.idle < 10 and self.last:
             goal[JOINTS] = self.rig.above[self.last]
         self.target += np.clip(goal - self.target, -0.028, 0.028)
