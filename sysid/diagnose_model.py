@@ -24,8 +24,9 @@ class Model:
         score: S, the error on held-out folds.
         penalty: its part from the nuisances.
         fold_theta: coordinates without each fold.
-        errors: mean squared weighted residual of held-out folds (controller,
-            mechanics); 1 where noise is all that is left.
+        errors: mean squared weighted residual on all data (controller, mechanics); 1
+            where noise is all that is left. Held-out folds would not tell: one that
+            alone tells a figure is badly predicted without it.
     """
 
     effects: tuple[str, ...]
@@ -89,7 +90,7 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         mine = squares[k * count : (k + 1) * count]
         heldout = np.take_along_axis(mine, folds[None], 0)[0].reshape(2, -1)
         score = float(heldout.sum())
-        errors = heldout.sum(1) / np.maximum(counted, 1)
+        errors = np.sum(fit.residual.reshape(2, -1) ** 2, 1) / np.maximum(counted, 1)
         penalty = _penalty(problem, tasks[k], effects, fit.theta)
         score = score + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
