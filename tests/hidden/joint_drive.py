@@ -99,7 +99,8 @@ class JointDrive:
         """Returns the torque of everything passive at the joint [N·m]."""
         force = self.dry.force(v, self.torque, load) + self.loop.force(q)
         if self.bend:
-            force -= max(self.viscous + math.copysign(self.bend, v), 0.0) * v
+            bend = self.bend if v > 0.0 else -self.bend
+            force -= max(self.viscous + bend, 0.0) * v
         if self.ripple:
             r = self.ripple
             force += r["size_nm"] * math.sin(r["teeth"] * q)

@@ -5,6 +5,7 @@ import math
 from dataclasses import replace
 from pathlib import Path
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from hidden.cases import draw_case
@@ -13,6 +14,9 @@ from hidden.recording import Recording, standard
 from hidden.sampling import Noise, exact, record
 from hidden.simulate import simulate
 from hidden.truth import Joint, Link, Mechanism
+
+from envs.hand.effects.catalogue import CATALOGUE
+from envs.hand.effects.chain import chain_step
 
 FOLDER = Path(__file__).parents[1] / "hidden"
 WEIGHT = Link(
@@ -116,6 +120,27 @@ def test_friction_that_knows_directions():
     for target, bound in ((0.2, 0.12), (-0.2, 0.08)):
         rest = held(with_dry, target).torque[-1, 0]
         assert abs(rest) <= bound + 1e-3
+
+
+@pytest.mark.parametrize("difference", [-0.06, 0.06])
+@pytest.mark.parametrize("speed", [-0.7, 0.7])
+def test_directions_have_the_sign_of_the_catalogue(difference, speed):
+    """Both simulators resist by the same torque, in the same direction."""
+    names = {
+        "asymmetric_viscous": "difference_nms",
+        "asymmetric_friction": "difference_nm",
+    }
+    for effect, name in names.items():
+        values = {name: difference}
+        drive = JointDrive(servo(**{effect: values}).joints[0], [0.0], [0.0], 5e-4)
+        for _ in range(2000):
+            force = drive.resist(0.0, speed, 0.0)
+        model = [(CATALOGUE[effect], {k: jnp.asarray(v) for k, v in values.items()})]
+        qd, none = jnp.asarray(speed), jnp.asarray(0.0)
+        x = chain_step(model, [()], none, none, qd, none, KP, KD, 5e-4)[1]
+        resists = -x.viscous * speed - x.friction * np.sign(speed)
+        assert force == pytest.approx(float(resists), abs=1e-4)
+        assert (abs(force) > 0.01) == (difference * speed > 0.0)
 
 
 def test_bristles_slip_at_the_stribeck_curve():
