@@ -243,8 +243,9 @@ def forced_residuals(
         moves = jnp.abs(qd) > 1e-6
         encoder, speed = states[-2]
         ratio = speed / (qd + 1.0 * ~moves)
-        steep = ratio * moves + steep * ~moves
-        acc = (now["acc"] + (skew + hold) * now["jerk"]) / steep
+        before, steep = steep, ratio * moves + steep * ~moves
+        acc = now["acc"] + (skew + hold) * now["jerk"]
+        acc = (acc - (steep - before) / dt * qd) / steep  # y = f(q), ÿ = f' q̈ + ḟ' q̇
         force = x.passive + x.load - (inertia - own) * acc
         behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
         needs = x.torque - own * acc + pull

@@ -56,10 +56,15 @@ def link_step(
 
 
 def _play(x, speed, force, inertia, half, dt) -> State:
-    """Flies freely, and stops at a wall."""
+    """Flies freely, and stops at a wall.
+
+    Angles belong to the steps of the grid and speeds to the middles between them, else
+    a flight of n steps would go 1 + 1/n times as far. The last speed before a wall is
+    the one that ends there.
+    """
+    place = jnp.clip(x + speed * dt, -half, half)
     ahead = speed + force / inertia * dt
-    free = x + ahead * dt
-    return jnp.clip(free, -half, half), ahead * (jnp.abs(free) < half)
+    return place, jnp.clip(ahead, (-half - place) / dt, (half - place) / dt)
 
 
 def _spring(x, speed, force, inertia, compliance, dt) -> State:

@@ -138,16 +138,19 @@ class Space:
     def starts(self, effect: str) -> list[dict[int, float]]:
         """Coordinates of an effect from which searches begin.
 
-        Sizes are tried one at a time, each with every shape.
+        Sizes are tried one at a time, each with every shape; shares also all at once,
+        for what one share does alone may be the opposite of what they do together.
         """
         indices = self.of(effect)
         sizes = [i for i in indices if self.slots[i].kind != "log" or effect in _LOGS]
         shapes = [i for i in indices if i not in sizes]
         grids = [self.slots[i].starts for i in shapes]
+        tried = [{i: u} for i in sizes for u in self.slots[i].starts]
+        if len(sizes) > 1 and all(self.slots[i].unit == "1" for i in sizes):
+            tried += [dict.fromkeys(sizes, u) for u in self.slots[sizes[0]].starts]
         return [
-            {i: u, **dict(zip(shapes, us, strict=True))}
-            for i in sizes
-            for u in self.slots[i].starts
+            {**some, **dict(zip(shapes, us, strict=True))}
+            for some in tried
             for us in itertools.product(*grids)
         ]
 
