@@ -4,7 +4,8 @@ Three things count, as deviations of a coordinate:
 
     noise         H⁻¹ s², H = JᵀJ + prior
     excitation    H⁻¹ (Σ_b g_b g_bᵀ) H⁻¹, g_b the slope of the error on stretch b
-    timing        what a servo's own cycle does to figures of its command path
+    timing        what a servo's own cycle does to figures of its command path, and
+                  what a grid's size may change by without another target on it
 
 The second is larger than the first where stretches of a record contradict each other,
 as they do where the model is not quite true or its errors hang together.
@@ -21,6 +22,10 @@ from sysid.diagnose_model import Model
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_space import Slot
 from sysid.diagnose_tracks import JointTrack
+
+COMB_SHARE = 1.5e-4
+"""Deviation of a grid's size, relative: half the step by which its slope is found,
+within which one target more or less falls on another tooth."""
 
 STRETCH_S = 0.5
 """Length of the stretches of a record that are compared [s]."""
@@ -44,7 +49,14 @@ def deviations(problem: Problem, model: Model, samples: int) -> Float[np.ndarray
     count = len(slopes)
     spread = slopes.T @ slopes * count / max(count - 1, 1)
     excitation = np.diag(inverse @ spread @ inverse)
-    timing = np.array([_timing(space.slots[i], problem.data) for i in fit.free])
+    timing = np.array(
+        [
+            COMB_SHARE * fit.theta[i]
+            if space.slots[i].comb
+            else _timing(space.slots[i], problem.data)
+            for i in fit.free
+        ]
+    )
     result = np.zeros(len(space.slots))
     result[fit.free] = np.sqrt(np.maximum(noise, excitation) + timing**2)
     return result

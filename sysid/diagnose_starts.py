@@ -3,12 +3,21 @@
 from collections.abc import Sequence
 
 import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
 
+from sysid.diagnose_forced import EVERY, TAPS
 from sysid.diagnose_model import Model
-from sysid.diagnose_problem import Problem
+from sysid.diagnose_problem import LANES, Problem
 
 COMB = (0.02, 0.002)
 """Logarithms around the best start within which a comb of optima is searched."""
+
+MOST_TEETH = 6e7
+"""Largest number of grids that are tried, times that of the targets."""
+
+TEETH = 16
+"""Number of steps of a grid whose starts are tried in the whole chain."""
 
 
 def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str, list]:
@@ -34,14 +43,10 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
 
 def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
     """Returns the coordinates that are tried for an effect."""
-    starts = []
-    for start in problem.space.starts(name):
-        theta = origin.copy()
-        theta[list(start)] = list(start.values())
-        starts.append(theta)
     if not _comb(problem, name):
-        return starts
+        return [_placed(origin, start) for start in problem.space.starts(name)]
     index = problem.space.of(name)[0]
+    starts = [_placed(origin, {index: u}) for u in _teeth(problem, origin, index)]
     for spread in COMB:
         costs = _linear_costs(problem, model, np.stack(starts))
         best = starts[int(np.argmin(costs))]
@@ -50,6 +55,62 @@ def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> lis
             theta[index] *= factor
             starts.append(theta)
     return starts
+
+
+def _placed(origin: np.ndarray, start: dict[int, float]) -> np.ndarray:
+    theta = origin.copy()
+    theta[list(start)] = list(start.values())
+    return theta
+
+
+def _teeth(
+    problem: Problem, origin: Float[np.ndarray, " n"], index: int
+) -> Float[np.ndarray, " k"]:
+    """Returns coordinates of grids near which the commands' optima lie.
+
+    With largest target u, grids Δ and Δ' agree on it while |u / Δ − u / Δ'| is well
+    below ½. So close together thousands are tried, and not in the whole chain but by
+    how much what is left looks like the rounding behind delay and low-pass.
+    """
+    slot, track = problem.space.slots[index], problem.data.track
+    targets = np.asarray(track.held, float)[:, -1]
+    ends = [slot.scale * u for u in (slot.starts[-1], slot.starts[0])]
+    count = 8.0 * np.abs(targets).max() * (1.0 / ends[1] - 1.0 / ends[0]) + 2.0
+    most = max(MOST_TEETH / targets.size, 1e3)
+    grids = 1.0 / np.linspace(1.0 / ends[0], 1.0 / ends[1], int(min(count, most)))
+    values, _ = problem.space.values(origin[None])
+    delay = values["transport_delay"]["delay_s"][0] / problem.data.dt
+    keeps = np.exp(
+        -2.0 * np.pi * values["lowpass_cutoff"]["cutoff_hz"][0] * problem.data.dt
+    )
+    raw = problem.raw(origin[None])
+    left = problem.whitened(raw)[0]
+    seen = 0 if problem.valid[0].any() else 1
+    gain = np.asarray(track.kp) * (2.0 * seen - 1.0) * problem.weight[seen]
+    likeness = []
+    for first in range(0, len(grids), LANES):
+        grid = grids[first : first + LANES, None, None]
+        rounding = grid * np.round(targets / grid) - targets
+        smooth = np.asarray(lfilter([1.0 - keeps], [1.0, -keeps], rounding, axis=1))
+        moved = np.zeros((len(grid), *raw.shape[1:]))
+        # A target comes anywhere in the step that ends with it.
+        moved[:, seen] = gain * _banded(smooth, delay + 0.5, raw.shape[2])
+        shown = problem.whitened(np.where(problem.valid, moved, 0.0))
+        size = np.sqrt(np.sum(shown**2, 1))
+        likeness.append(-shown @ left / np.maximum(size, 1e-12))
+    best = np.argsort(-np.concatenate(likeness))[:TEETH]
+    return grids[best] / slot.scale
+
+
+def _banded(x: np.ndarray, delay: float, count: int) -> Float[np.ndarray, "c m p"]:
+    """Reads signals some steps earlier and passes them through the residuals' band."""
+    place = np.clip(np.arange(x.shape[1]) - delay, 0.0, x.shape[1] - 1.0)
+    low = np.minimum(place.astype(int), x.shape[1] - 2)
+    part = (place - low)[:, None]
+    late = (1.0 - part) * x[:, low] + part * x[:, low + 1]
+    last = (count - 1) * EVERY + 1
+    parts = [w * late[:, k : k + last : EVERY] for k, w in enumerate(TAPS.tolist())]
+    return np.sum(parts, 0)
 
 
 def _comb(problem: Problem, name: str) -> bool:

@@ -126,18 +126,21 @@ def test_friction_that_knows_directions():
 @pytest.mark.parametrize("speed", [-0.7, 0.7])
 def test_directions_have_the_sign_of_the_catalogue(difference, speed):
     """Both simulators resist by the same torque, in the same direction."""
-    names = {
-        "asymmetric_viscous": "difference_nms",
-        "asymmetric_friction": "difference_nm",
-    }
-    for effect, name in names.items():
-        values = {name: difference}
-        drive = JointDrive(servo(**{effect: values}).joints[0], [0.0], [0.0], 5e-4)
+    values = {"difference_nms": difference}, {"difference_nm": difference}
+    hidden = (
+        servo(asymmetric_viscous=values[0]),
+        servo(asymmetric_friction=values[1]),
+    )
+    for effect, known, truth in zip(
+        ("asymmetric_viscous", "asymmetric_friction"), values, hidden, strict=True
+    ):
+        drive = JointDrive(truth.joints[0], [0.0], [0.0], 5e-4)
+        force = 0.0
         for _ in range(2000):
             force = drive.resist(0.0, speed, 0.0)
-        model = [(CATALOGUE[effect], {k: jnp.asarray(v) for k, v in values.items()})]
+        model = [(CATALOGUE[effect], {k: jnp.asarray(v) for k, v in known.items()})]
         qd, none = jnp.asarray(speed), jnp.asarray(0.0)
-        x = chain_step(model, [()], none, none, qd, none, KP, KD, 5e-4)[1]
+        x = chain_step(model, ((),), none, none, qd, none, KP, KD, 5e-4)[1]
         resists = -x.viscous * speed - x.friction * np.sign(speed)
         assert force == pytest.approx(float(resists), abs=1e-4)
         assert (abs(force) > 0.01) == (difference * speed > 0.0)
