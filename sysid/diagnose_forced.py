@@ -197,6 +197,10 @@ def forced_residuals(
     figures = ("effort_gain", "mass", "skew_s", "hold_s", "push_gain", "rotor")
     gain, mass, skew, hold, pushed, rotor = (nuisance[k][None, :] for k in figures)
     gap, soft, rotor = _between(params, rotor)
+    whole = mass * jnp.mean(track.inertia, 0)[:, None]
+    inner = jnp.minimum(rotor, 0.9 * whole)
+    heard = (track.noise[0], track.noise[3], EVERY * dt)
+    shaken = link.spring_noise(whole - inner, inner, soft, *heard)
 
     def model(now, ripple):
         effort = gain * now["effort"]
@@ -249,7 +253,7 @@ def forced_residuals(
         force = x.passive + x.load - (inertia - own) * acc
         behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
         needs = x.torque - own * acc + pull
-        unit = gain * loud[1] / usual[1]
+        unit = gain * shaken * loud[1] / usual[1]
         quiet = loud[0] / usual[0]
         out = {
             "servo": (now["effort"] - states[-1] / gain) / quiet,

@@ -17,11 +17,48 @@ from jaxtyping import Array, Float
 DAMPING = 0.1
 """Damping ratio of a spring: what metal and gears have."""
 
+POINTS = 64
+"""Number of frequencies over which noise is averaged."""
+
 EFFECTS = ("backlash", "compliance")
 """Effects that act here."""
 
 State = tuple[Float[Array, "p c"], Float[Array, "p c"]]
 """Angle [rad] and speed [rad/s] of the link less the motor's."""
+
+
+def spring_noise(
+    inertia: Float[Array, "p c"],
+    rotor: Float[Array, "p c"],
+    compliance: Float[Array, "1 c"],
+    angle: Float[Array, ""],
+    effort: Float[Array, ""],
+    step_s: float,
+) -> Float[Array, "p c"]:
+    """Returns how much louder a spring makes the needed torque than a rigid link.
+
+    What is noise in the motor's angle shakes the link at its own frequency. Without
+    this the fit would give the motor more of the inertia, and the spring less to shake.
+
+        A² = mean_ω (|J_m + J H|² ω⁴ s² + e²) / ((J_m + J)² ω⁴ s² + e²)
+
+    with H = 1 / (1 − ω² J C + 2 i ζ ω √(J C)) and the noise of angle s and effort e; the
+    residual is white up to half its rate.
+
+    Args:
+        inertia: J, of the link [kg·m²].
+        rotor: J_m, on the motor's side [kg·m²].
+        compliance: C; 0 for none [rad/(N·m)].
+        angle, effort: s and e in the same band [rad], [N·m].
+        step_s: time between samples of the residual [s].
+    """
+    omega = jnp.pi / step_s * (jnp.arange(POINTS) + 0.5)[:, None, None] / POINTS
+    shakes = omega**2 * jnp.maximum(angle, 1e-12)
+    lag = omega * jnp.sqrt(inertia * compliance)
+    link = inertia / (1.0 - lag**2 + 2.0j * DAMPING * lag)
+    soft = (jnp.abs(rotor + link) * shakes) ** 2 + effort**2
+    rigid = ((rotor + inertia) * shakes) ** 2 + effort**2
+    return jnp.where(compliance > 0.0, jnp.sqrt(jnp.mean(soft / rigid, 0)), 1.0)
 
 
 def link_step(
