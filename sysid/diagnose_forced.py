@@ -199,7 +199,7 @@ def forced_residuals(
     gap, soft, rotor = _between(params, rotor)
     whole = mass * jnp.mean(track.inertia, 0)[:, None]
     inner = jnp.minimum(rotor, 0.9 * whole)
-    heard = (track.noise[0], track.noise[3], EVERY * dt)
+    heard = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
     shaken = link.spring_noise(whole - inner, inner, soft, *heard)
 
     def model(now, ripple):

@@ -42,14 +42,14 @@ def spring_noise(
 
         A² = mean_ω (|J_m + J H|² ω⁴ s² + e²) / ((J_m + J)² ω⁴ s² + e²)
 
-    with H = 1 / (1 − ω² J C + 2 i ζ ω √(J C)) and the noise of angle s and effort e; the
-    residual is white up to half its rate.
+    with H = 1 / (1 − ω² J C + 2 i ζ ω √(J C)); a residual is white up to half its rate.
 
     Args:
         inertia: J, of the link [kg·m²].
         rotor: J_m, on the motor's side [kg·m²].
         compliance: C; 0 for none [rad/(N·m)].
-        angle, effort: s and e in the same band [rad], [N·m].
+        angle: s, noise of the angle [rad].
+        effort: e, noise of the effort in the same band [N·m].
         step_s: time between samples of the residual [s].
     """
     omega = jnp.pi / step_s * (jnp.arange(POINTS) + 0.5)[:, None, None] / POINTS
