@@ -24,6 +24,7 @@ def test_throughput_is_measured_and_compared(tmp_path):
         "--seconds",
         "0.1",
         "--json",
+        str(out),
     ]
     done = subprocess.run(
         [sys.executable, str(SCRIPT), *words],
