@@ -108,9 +108,10 @@ def _searched(problem: Problem, base: Model) -> Search:
             break
         if len(best.effects) == 1:
             rivals[best.effects[0]] = [m for m in stage if m is not winner]
-    without = {best.effects[0]: base} if best.effects else {}
-    if len(best.effects) > 1:
-        rivals, without = _swapped(problem, best)
+    if len(best.effects) == 1 and best.effects[0] in rivals:
+        without = {best.effects[0]: base}
+    else:
+        best, rivals, without = _exchanged(problem, best, base)
     return Search(problem, base, best, rivals, without, samples)
 
 
@@ -119,9 +120,11 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     samples = int(problem.counts().sum())
     gain = gain_nat(smaller, larger, samples)
     added = [e for e in larger.effects if e not in smaller.effects]
+    # What an equation leaves of a large effect is not another effect.
+    least = ALIKE * gain_nat(base, smaller, samples)
     if all(problem.space.figured(e) for e in added):
-        return gain > FIGURE_THRESHOLD
-    return gain > THRESHOLD and _shares(problem, smaller, larger, base)
+        return gain > max(FIGURE_THRESHOLD, least)
+    return gain > max(THRESHOLD, least) and _shares(problem, smaller, larger, base)
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
@@ -223,14 +226,39 @@ def _pruned(problem: Problem, model: Model, base: Model) -> Model:
     return model
 
 
+def _exchanged(
+    problem: Problem, best: Model, base: Model
+) -> tuple[Model, dict[str, list[Model]], dict[str, Model]]:
+    """Lets other effects take the places of causes while that is better.
+
+    The first cause of several was chosen when it stood for all of them.
+
+    Returns:
+        The model, and for each cause its rivals and the model without it.
+    """
+    samples = int(problem.counts().sum())
+    for _ in range(MOST):
+        rivals, without = _swapped(problem, best, base)
+        for cause, stage in rivals.items():
+            least = NEARLY * gain_nat(without[cause], best, samples)
+            better = [m for m in stage if gain_nat(best, m, samples) > max(3.0, least)]
+            if better:
+                break
+        else:
+            return best, rivals, without
+        best = _pruned(problem, better[0], base)
+    return best, *_swapped(problem, best, base)
+
+
 def _swapped(
-    problem: Problem, best: Model
+    problem: Problem, best: Model, base: Model
 ) -> tuple[dict[str, list[Model]], dict[str, Model]]:
     """Lets every other effect take the place of each cause, and none."""
     rivals, without = {}, {}
     for cause in best.effects:
         rest = tuple(e for e in best.effects if e != cause)
-        without[cause] = fit_models(problem, [rest], [best.fit.theta])[0]
+        refit = fit_models(problem, [rest], [best.fit.theta])[0] if rest else base
+        without[cause] = refit
         stage = extended(problem, without[cause])
         rivals[cause] = [m for m in stage if cause not in m.effects]
     return rivals, without

@@ -10,6 +10,7 @@ from hidden.recording import standard
 from hidden.sampling import Noise, record
 from hidden.stands import make_stand
 
+from sysid import diagnose_search
 from sysid.data import make_log
 from sysid.diagnose import problem_of
 from sysid.diagnose_left import left_over
@@ -110,3 +111,28 @@ def test_jumps_that_do_not_repeat_are_not_noise(searched):
     data = replace(problem.data, track=track.replace(effort=effort))
     left = left_over(replace(searched, problem=replace(problem, data=data)))
     assert any("controller residual has jumps" in text for text in left)
+
+
+def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
+    """The first of two causes was chosen when it had to stand for both."""
+    problem, base = searched.problem, searched.base
+
+    def scored(effects, gained):
+        score = base.score - 2.0 * gained
+        fit = replace(base.fit, cost=base.fit.cost - 2.0 * gained)
+        return replace(base, effects=effects, score=score, fit=fit)
+
+    first = scored(("payload_com", "deadband"), 300.0)
+    right = scored(("deadband", "joint_coupling"), 340.0)
+    without = {"payload_com": scored(("deadband",), 100.0), "deadband": base}
+    offered = {first.effects: {"payload_com": [right], "deadband": []}}
+    monkeypatch.setattr(
+        diagnose_search,
+        "_swapped",
+        lambda problem, best, base: (offered.get(best.effects, {}), without),
+    )
+    monkeypatch.setattr(diagnose_search, "_pruned", lambda problem, model, base: model)
+    assert diagnose_search._exchanged(problem, first, base)[0] is right
+    close = scored(right.effects, 302.0)
+    offered[first.effects]["payload_com"] = [close]
+    assert diagnose_search._exchanged(problem, first, base)[0] is first

@@ -232,6 +232,14 @@ def test_a_shifted_payload_turns_by_its_nominal_weight():
     assert load[-1] == pytest.approx(0.1 * G * 0.01, rel=1e-4)  # along the axis: none
 
 
+def test_a_payload_further_out_is_harder_to_turn():
+    shift = {"payload_com": {"x_m": 0.01, "y_m": 0.3, "z_m": -0.02}}
+    x = rig.run(shift, rig.hold(0.0, 0.01))[2]
+    moved = np.cross(rig.AXIS, rig.ARM + np.array([0.01, 0.3, -0.02]))
+    expected = 0.1 * (moved @ moved - np.sum(np.cross(rig.AXIS, rig.ARM) ** 2))
+    assert x.inertia[-1] == pytest.approx(expected, rel=1e-4)
+
+
 def test_tilt_turns_all_gravity_and_leaves_its_size():
     for angle in (0.1, -0.3):
         x = rig.run(
