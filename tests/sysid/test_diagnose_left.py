@@ -66,7 +66,7 @@ def test_nothing_is_left_of_a_joint_without_effects(searched):
 
 
 def test_an_error_common_to_the_repeats_is_left(searched):
-    wrong = replace(searched.best, errors=np.array([1.0, 2.6]))
+    wrong = replace(searched.best, errors=np.array([1.0, 4.6]))
     before = replace(searched.best, errors=np.array([1.0, 16.0]))
     left = left_over(replace(searched, base=before, best=wrong))
     assert len(left) == 1
