@@ -213,13 +213,16 @@ def forced_residuals(
         return ((_SLOW, slow), *body, (_READ, read), (_ENTER, enter))
 
     def step(carry, row):
-        states, shift, shift_speed, steep, behind = carry
+        states, last, told, steep, behind = carry
         row, target, ripple = row
         now = {k: v[:, None] for k, v in row.items()}
-        q = now["pos"] + skew * now["vel"] - shift
-        qd = now["vel"] + skew * now["acc"] - shift_speed
-        turned = (shift - behind[0])[..., None] * now["turned"]
-        moment = mass[..., None] * (now["moment"] - turned)
+        angle = now["pos"] + skew * now["vel"]
+        # The angle of which the encoder would tell this: a step of Newton's method.
+        q = last + (angle - told) / steep
+        qd = (now["vel"] + skew * now["acc"]) / steep
+        away = (q - angle + behind[0])[..., None]
+        moment = jnp.cos(away) * now["moment"] + jnp.sin(away) * now["turned"]
+        moment = mass[..., None] * moment
         gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
         load = now["push"] + pushed * now["ext"] + jnp.sum(moment * gravity, -1)
         payload_kg = jnp.broadcast_to(track.payload_kg[:, None], q.shape)
@@ -263,14 +266,15 @@ def forced_residuals(
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
         }
-        return (states, encoder - q, speed - qd, steep, behind), out
+        return (states, q, encoder, steep, behind), out
 
     rows = {k: getattr(track, k) for k in _STEPWISE}
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
     none = jnp.zeros_like(q0)
+    read = q0 + skew * first["vel"]
     states = init_states(model(first, ripple[0]), path[0], q0, dt)
-    start = (states, none, none, none + 1.0, (none, none))
+    start = (states, read, read, none + 1.0, (none, none))
     out = jax.lax.scan(step, start, (rows, path, ripple))[1]
     return _filtered(
         out | {"command": path}, track.slow_vel[:, :, None], friction_speed
