@@ -183,6 +183,20 @@ def test_a_torque_that_acts_late_is_no_friction():
     assert held < 0.35 * plain
 
 
+def test_an_angle_that_is_told_too_small_is_not_late():
+    """Behind an encoder of scale 0.6 a motion at 2 Hz, half a radian wide."""
+    t_s, scale, rate = np.arange(0.0, 6.0, 0.005), 0.6, 2.0 * np.pi * 2.0
+    q = 0.5 * np.sin(rate * t_s)
+    tau = -2.1e-3 * rate**2 * q + 0.2 * 9.81 * 0.1 * np.sin(q)
+    mechanism, log = stand(), log_of(t_s, q, scale * q, tau=tau)
+    problem = problem_of(all_tracks([log], mechanism)[0], [log], mechanism, False)
+    theta = np.stack([problem.space.base] * 2)
+    (at,) = problem.space.of("encoder_scale")
+    theta[1, at] = problem.space.slots[at].coordinate(scale)
+    plain, told = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
+    assert told < 0.01 * plain
+
+
 def test_a_fit_leaves_the_kink_of_a_delay():
     """Believed are four steps of the grid, where targets arrive as readings are taken.
 
