@@ -4,8 +4,9 @@ Three things count, as deviations of a coordinate:
 
     noise         H⁻¹ s², H = JᵀJ + prior
     excitation    H⁻¹ (Σ_b g_b g_bᵀ) H⁻¹, g_b the slope of the error on stretch b
-    timing        what a servo's own cycle does to figures of its command path, and
-                  what a grid's size may change by without another target on it
+    the unknown   what a servo's own cycle does to figures of its command path; what a
+                  grid's size may change by without another target on it; that a spring
+                  is told by a resonance whose damping ratio is only assumed
 
 The second is larger than the first where stretches of a record contradict each other,
 as they do where the model is not quite true or its errors hang together.
@@ -18,6 +19,7 @@ from jaxtyping import Float
 
 from sysid.diagnose_doubt import CYCLE_S
 from sysid.diagnose_forced import EVERY
+from sysid.diagnose_link import DAMPING
 from sysid.diagnose_model import Model
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_space import Slot
@@ -49,16 +51,9 @@ def deviations(problem: Problem, model: Model, samples: int) -> Float[np.ndarray
     count = len(slopes)
     spread = slopes.T @ slopes * count / max(count - 1, 1)
     excitation = np.diag(inverse @ spread @ inverse)
-    timing = np.array(
-        [
-            COMB_SHARE * fit.theta[i]
-            if space.slots[i].comb
-            else _timing(space.slots[i], problem.data)
-            for i in fit.free
-        ]
-    )
+    unknown = [_unknown(space.slots[i], fit.theta[i], problem.data) for i in fit.free]
     result = np.zeros(len(space.slots))
-    result[fit.free] = np.sqrt(np.maximum(noise, excitation) + timing**2)
+    result[fit.free] = np.sqrt(np.maximum(noise, excitation) + np.square(unknown))
     return result
 
 
@@ -76,6 +71,15 @@ def _slopes(problem: Problem, model: Model) -> Float[np.ndarray, "b k"]:
     order = np.unique(block)
     g = np.stack([j[block == b].T @ r[block == b] for b in order])
     return g - g.mean(0)
+
+
+def _unknown(slot: Slot, u: float, data: JointTrack) -> float:
+    """Returns how far a coordinate u may be off because of what no model has."""
+    if slot.comb:
+        return COMB_SHARE * abs(u)
+    if slot.effect == "compliance":
+        return DAMPING * (u if slot.kind == "linear" else 1.0)
+    return _timing(slot, data)
 
 
 def _timing(slot: Slot, data: JointTrack) -> float:

@@ -255,7 +255,8 @@ def _sizes(track: JointTrack) -> dict[str, float]:
 
 _GRIDS = {
     "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
-    "rad/(N·m)": (0.01, 0.03, 0.1, 0.3, 1.0),
+    # Half the width of a resonance apart: ω ∝ 1 / √C.
+    "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
 }
 _TEETH = (0.015, 1.0)
 _RECIPROCAL = {"N·m": (1.0, 1.2, 1.6), "rad/s": (0.6, 0.9, 1.2, 1.8)}

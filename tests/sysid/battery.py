@@ -9,6 +9,7 @@ seed goes on where the first was stopped.
 
 import argparse
 import json
+import math
 import multiprocessing
 import os
 import time
@@ -30,6 +31,9 @@ SHARES = {
     "outside": 0.06,
     "invisible": 0.06,
 }
+VECTORS = ("encoder_eccentricity",)
+"""Effects whose parameters are parts of one vector; errors are shares of its length."""
+
 FULL = 700
 """Records of the full battery: 350 single ones (four for each effect and magnitude),
 210 without effect."""
@@ -121,7 +125,10 @@ def run_task(task: Task) -> Row:
             for name, estimate in cause.parameters.items():
                 if name in true and true[name] != 0.0:
                     key = f"{cause.effect}.{name}"
-                    errors[key] = abs(estimate.value - true[name]) / abs(true[name])
+                    size = abs(true[name])
+                    if cause.effect in VECTORS:
+                        size = math.hypot(*true.values())
+                    errors[key] = abs(estimate.value - true[name]) / size
                     covered[key] = bool(estimate.low <= true[name] <= estimate.high)
     return Row(
         **common,

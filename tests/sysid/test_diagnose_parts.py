@@ -14,6 +14,7 @@ from sysid.data import make_log
 from sysid.diagnose import diagnose, problem_of
 from sysid.diagnose_command import command_path
 from sysid.diagnose_grid import held_targets, shares, smoothed
+from sysid.diagnose_link import link_step, spring_noise
 from sysid.diagnose_records import grid_step_s, pieces_of
 from sysid.diagnose_search import settled
 from sysid.diagnose_space import make_space
@@ -228,3 +229,29 @@ def test_a_joint_that_stands():
     assert not found.causes
     assert "coulomb_friction" in found.not_observable
     assert found.next_experiment
+
+
+def test_a_link_flies_through_its_play():
+    """Under a torque c t it goes c t³ / 6 J, and stops at the wall."""
+    dt, inertia, rise, gap = 0.005, 1e-3, 0.5, 0.5
+    one = jnp.ones((1, 1))
+    state = (-0.5 * gap * one, 0.0 * one)
+    for k in range(1, 51):
+        force = rise * k * dt * one
+        link = (force, inertia * one, gap * one, 0.0 * one, dt)
+        state, pull = link_step(state, *link)
+        if k == 20:
+            way = float(state[0][0, 0]) + 0.5 * gap
+            assert way == pytest.approx(rise * (k * dt) ** 3 / 6.0 / inertia, rel=0.01)
+            assert float(pull[0, 0]) == pytest.approx(0.0, abs=1e-6)
+    assert float(state[0][0, 0]) == pytest.approx(0.5 * gap)
+    assert float(pull[0, 0]) == pytest.approx(rise * 50 * dt)
+
+
+def test_a_spring_shakes_in_the_noise_of_its_motor():
+    link, rotor = 2e-3 * jnp.ones((1, 3)), 1e-3 * jnp.ones((1, 3))
+    soft = jnp.array([[0.0, 1e-6, 0.05]])
+    loud = spring_noise(link, rotor, soft, jnp.array(1e-4), jnp.array(1e-3), 0.02)
+    assert float(loud[0, 0]) == 1.0
+    assert float(loud[0, 1]) == pytest.approx(1.0, abs=0.01)
+    assert float(loud[0, 2]) > 1.3
