@@ -259,7 +259,12 @@ _GRIDS = {
     "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
 }
 _TEETH = (0.015, 1.0)
-_RECIPROCAL = {"N·m": (1.0, 1.2, 1.6), "rad/s": (0.6, 0.9, 1.2, 1.8)}
+_RECIPROCAL = {
+    "N·m": (1.0, 1.2, 1.6),
+    "rad/s": (0.6, 0.9, 1.2, 1.8),
+    # A little too tight a limit is far worse than none: its optimum is narrow.
+    "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
+}
 
 
 def _slot(
