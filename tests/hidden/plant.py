@@ -15,6 +15,9 @@ STEP_S = 0.0005
 GRAVITY = 9.81
 ROTOR_SHARE = 0.5
 """Share of the armature on the motor's side of play or compliance."""
+STOP_RAD = 0.4
+"""How far beyond their ranges joints stop: an encoder that is wrong must not lead a
+recording against stops, which no effect of the catalogue describes [rad]."""
 
 
 @dataclass(frozen=True)
@@ -95,7 +98,7 @@ def _add(spec, parent, link: Link, joint: Joint, extra_kg: float):
         armature=armature * (1.0 - ROTOR_SHARE * bool(between)),
         damping=viscous * joint.value("viscous_friction", "damping_nms", 0.0),
         frictionloss=dry * joint.value("coulomb_friction", "torque_nm", 0.0),
-        range=link.range_rad,
+        range=np.add(link.range_rad, [-STOP_RAD, STOP_RAD]),
         limited=True,
     )
     hinge.solref_friction = [4.0 * STEP_S, 1.0]
