@@ -11,8 +11,11 @@ figure far out of its tolerance is a finding and not silently absorbed.
 
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 
+from sysid.diagnose_forced import EVERY
+from sysid.diagnose_link import spring_noise
 from sysid.diagnose_model import Model, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
@@ -119,12 +122,33 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     """Tells whether a larger model is worth its effect."""
     samples = int(problem.counts().sum())
     gain = gain_nat(smaller, larger, samples)
+    gain += _louder(problem, smaller) - _louder(problem, larger)
     added = [e for e in larger.effects if e not in smaller.effects]
     # What an equation leaves of a large effect is not another effect.
     least = ALIKE * gain_nat(base, smaller, samples)
     if all(problem.space.figured(e) for e in added):
         return gain > max(FIGURE_THRESHOLD, least)
     return gain > max(THRESHOLD, least) and _shares(problem, smaller, larger, base)
+
+
+def _louder(problem: Problem, model: Model) -> float:
+    """Returns n log A [nat] of a spring that makes the noise of n readings A times.
+
+    The density of readings falls with it: noise that is called loud is no explanation.
+    """
+    if "compliance" not in model.effects:
+        return 0.0
+    slots, track = problem.space.slots, problem.data.track
+    soft, rotor = (
+        float(slots[i].value(model.fit.theta[i]))
+        for i in problem.space.of("compliance")
+    )
+    whole = float(np.mean(np.asarray(track.inertia)))
+    rotor = min(rotor, 0.9 * whole)
+    heard = (track.noise[1, 0], track.noise[1, 3], EVERY * problem.data.dt)
+    inner, soft, rest = (jnp.full((1, 1), x) for x in (rotor, soft, whole - rotor))
+    loud = float(spring_noise(rest, inner, soft, *heard)[0, 0])
+    return float(problem.counts().reshape(2, -1)[1].sum()) * float(np.log(loud))
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
