@@ -51,7 +51,9 @@ def deviations(problem: Problem, model: Model, samples: int) -> Float[np.ndarray
     count = len(slopes)
     spread = slopes.T @ slopes * count / max(count - 1, 1)
     excitation = np.diag(inverse @ spread @ inverse)
-    unknown = [_unknown(space.slots[i], fit.theta[i], problem.data) for i in fit.free]
+    unknown = [
+        _unknown(space.slots[i], float(fit.theta[i]), problem.data) for i in fit.free
+    ]
     result = np.zeros(len(space.slots))
     result[fit.free] = np.sqrt(np.maximum(noise, excitation) + np.square(unknown))
     return result
