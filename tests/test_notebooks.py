@@ -28,7 +28,7 @@ def test_notebooks_are_committed_without_outputs(path):
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_notebooks_run(path, tmp_path):
     (tmp_path / "cells.py").write_text(code(path), encoding="utf-8")
-    few = {"SECONDS": "30", "EPISODES": "2", "ITERATIONS": "1"}
+    few = {"SECONDS": "30", "EPISODES": "2"}
     few = {f"NOTEBOOK_{name}": value for name, value in few.items()}
     few["NOTEBOOK_OUT"] = str(tmp_path / "out")
     subprocess.run(
