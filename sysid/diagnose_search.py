@@ -130,21 +130,11 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     gain += _louder(problem, smaller) - _louder(problem, larger)
     added = [e for e in larger.effects if e not in smaller.effects]
     # What an equation leaves of a large effect is not another effect.
-    least = ALIKE * _gained(problem, base, smaller, larger)
+    least = ALIKE * gain_nat(base, smaller, samples)
     if all(problem.space.figured(e) for e in added):
         return gain > max(FIGURE_THRESHOLD, least)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     return gain > max(threshold, least) and _shares(problem, smaller, larger, base)
-
-
-def _gained(problem: Problem, base: Model, smaller: Model, larger: Model) -> float:
-    """Returns what the causes so far gained [nat] in the residual that now gains most.
-
-    A large effect on the controller leaves nothing in the mechanics.
-    """
-    counts = problem.counts().reshape(2, -1).sum(1)
-    k = int(np.argmax(counts * (smaller.errors - larger.errors)))
-    return 0.5 * float(counts[k] * (base.errors[k] - smaller.errors[k]))
 
 
 def _louder(problem: Problem, model: Model) -> float:
