@@ -12,7 +12,7 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
-from hidden.recording import Recording, standard
+from hidden.recording import standard
 from hidden.sampling import Noise, record
 from hidden.stands import make_stand, slightly_wrong
 
@@ -49,17 +49,10 @@ def finger_log() -> MeasuredLog:
     """Records the finger."""
     rng = np.random.default_rng(SEED)
     stand = make_stand("finger", rng, lowpass_hz=3.0)
-    once = standard(rng, stand.middle, stand.reach, RATE_HZ, ROUND_S, 1, False)
+    rounds = standard(rng, stand.middle, stand.reach, RATE_HZ, ROUND_S, ROUNDS, False)
     truth = slightly_wrong(stand.mechanism, rng)
     for joint in stand.moved:
         truth = truth.with_effect(joint, "deadband", half_width_rad=HALF_WIDTH_RAD)
-    rows = len(once.targets)
-    parts = tuple(
-        (name, k, first + k * rows, last + k * rows)
-        for k in range(ROUNDS)
-        for name, _, first, last in once.parts
-    )
-    rounds = Recording(RATE_HZ, np.tile(once.targets, (ROUNDS, 1)), parts)
     quat_w = stand.mechanism.base_quat_w
     return record(truth, rounds, Noise(), rng, palm_quat_w=quat_w, source="a stand")
 

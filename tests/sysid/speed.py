@@ -12,7 +12,7 @@ import time
 
 import numpy as np
 from hidden.believed import believed
-from hidden.recording import Recording, standard
+from hidden.recording import standard
 from hidden.sampling import Noise, record
 from hidden.stands import make_stand, slightly_wrong
 
@@ -50,8 +50,7 @@ def made(kind: str, seed: int):
     stand = make_stand(kind, rng)
     rate_hz, round_s = RECORDS[kind]
     alone = len(stand.moved) == 1
-    once = standard(rng, stand.middle, stand.reach, rate_hz, round_s, 1, alone)
-    rounds = Recording(rate_hz, np.tile(once.targets, (3, 1)), once.parts)
+    rounds = standard(rng, stand.middle, stand.reach, rate_hz, round_s, 3, alone)
     truth = slightly_wrong(stand.mechanism, rng)
     truth = truth.with_effect(stand.moved[-1], "backlash", gap_rad=GAP_RAD)
     quat_w = stand.mechanism.base_quat_w
