@@ -198,7 +198,7 @@ def forced_residuals(
     gain, mass, skew, hold, pushed, rotor = (nuisance[k][None, :] for k in figures)
     gap, soft, rotor = _between(params, rotor)
     whole = mass * jnp.mean(track.inertia, 0)[:, None]
-    inner = jnp.minimum(rotor, 0.9 * whole)
+    inner = jnp.minimum(rotor, link.MOST_ROTOR * whole)
     heard = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
     shaken = link.spring_noise(whole - inner, inner, soft, *heard)
 
@@ -245,7 +245,7 @@ def forced_residuals(
         )
         inertia = mass * now["inertia"] + x.inertia
         loud, usual = _loudness(track, now, x, gain, inertia / steep)
-        own = jnp.minimum(rotor, 0.9 * inertia)
+        own = jnp.minimum(rotor, link.MOST_ROTOR * inertia)
         # What encoders make of angles is as steep for speeds and accelerations.
         moves = jnp.abs(qd) > 1e-6
         encoder, speed = states[-2]

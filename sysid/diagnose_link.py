@@ -17,6 +17,9 @@ from jaxtyping import Array, Float
 DAMPING = 0.1
 """Damping ratio of a spring: what metal and gears have."""
 
+MOST_ROTOR = 0.9
+"""Largest share of a joint's inertia that is on the motor's side."""
+
 POINTS = 64
 """Number of frequencies over which noise is averaged."""
 

@@ -15,7 +15,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from sysid.diagnose_forced import EVERY
-from sysid.diagnose_link import spring_noise
+from sysid.diagnose_link import MOST_ROTOR, spring_noise
 from sysid.diagnose_model import Model, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
@@ -150,7 +150,7 @@ def _louder(problem: Problem, model: Model) -> float:
         for i in problem.space.of("compliance")
     )
     whole = float(np.mean(np.asarray(track.inertia)))
-    rotor = min(rotor, 0.9 * whole)
+    rotor = min(rotor, MOST_ROTOR * whole)
     heard = (track.noise[1, 0], track.noise[1, 3], EVERY * problem.data.dt)
     inner, soft, rest = (jnp.full((1, 1), x) for x in (rotor, soft, whole - rotor))
     loud = float(spring_noise(rest, inner, soft, *heard)[0, 0])

@@ -24,7 +24,6 @@ WIDER = 2.5
 SURE = 3.0
 """Gap below which two effects cannot be told apart [nat]."""
 
-
 SEEN = 12.0
 """Gain from which on an effect counts as seen [nat]."""
 

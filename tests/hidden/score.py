@@ -1,9 +1,14 @@
-"""What a battery of hidden cases says about a diagnosis, in the figures asked for."""
+"""What a battery of hidden cases says about a diagnosis, in the figures asked for.
+
+PYTHONPATH=.:tests python -m hidden.score ROWS.jsonl
+"""
 
 import json
+import sys
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 
 import numpy as np
 from hidden.truth import OUTSIDE
@@ -186,3 +191,8 @@ def report(rows: Sequence[Row]) -> str:
         )
         lines.append(f"  {name:28s} {text}")
     return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    lines = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
+    print(report([Row.from_json(line) for line in lines]))
