@@ -16,6 +16,7 @@ from envs.errors import InputError
 from sysid.data import MeasuredLog
 from sysid.data_timing import column_timing, continuous_parts
 from sysid.diagnose_grid import SMOOTH_STEPS, held_targets, shares, smoothed
+from sysid.mechanism import JointDrive
 
 GRID_S = 0.004
 """Step that a grid does not go much below [s]; slower logs keep their own."""
@@ -96,26 +97,26 @@ def _period_s(log: MeasuredLog, name: str) -> float:
 
 
 def pieces_of(
-    log: MeasuredLog, index: int, joints: Mapping[str, str], step_s: float
+    log: MeasuredLog, index: int, drives: Mapping[str, JointDrive], step_s: float
 ) -> list[Piece]:
     """Puts a record on a grid.
 
     Args:
         log: the record.
         index: its place among the records.
-        joints: quantity that tells the effort by joint; `none` leaves it out.
+        drives: the simulation as it stands, by joint.
         step_s: step of the grid [s].
 
     Returns:
         Its pieces, without those that are too short.
     """
     pieces = []
-    periods = [column_timing(log, f"pos.{joint}").period_s for joint in joints]
+    periods = [column_timing(log, f"pos.{joint}").period_s for joint in drives]
     every = max(1, round(step_s / min(periods)))
-    for start, stop in _spans(log, f"pos.{next(iter(joints))}"):
+    for start, stop in _spans(log, f"pos.{next(iter(drives))}"):
         if stop - start >= MIN_PIECE_S:
             parts = [
-                _joint(log, j, joints[j], start, stop, step_s, every) for j in joints
+                _joint(log, j, drives[j], start, stop, step_s, every) for j in drives
             ]
             kept = [part for part in parts if part is not None]
             if len(kept) == len(parts):
@@ -155,10 +156,10 @@ def _joined(spans: list, period_s: float) -> list[tuple[float, float]]:
     return joined
 
 
-def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
+def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
     """Puts one joint of one stretch on the grid."""
     names = {"cmd": f"cmd.{joint}", "pos": f"pos.{joint}"}
-    names |= {"effort": f"{effort}.{joint}", "ext": f"ext.{joint}"}
+    names |= {"effort": f"{drive.effort}.{joint}", "ext": f"ext.{joint}"}
     names = {key: name for key, name in names.items() if name in log.columns}
     period = column_timing(log, names["pos"]).period_s
     fine_s = step_s / every
@@ -173,7 +174,8 @@ def _joint(log, joint, effort, start, stop, step_s, every) -> dict | None:
         t_s, values = t_s[inside], values[inside]
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
-            valid &= ~_unsaid(t_s, values, fine, 1.6 * period)
+            speed = drive.figure("slew_limit", "speed_rad_s", np.inf)
+            valid &= ~_unsaid(t_s, values, fine, 1.6 * period, speed)
             valid &= ~_untold(log, name, names["pos"], fine)
         else:
             columns[key] = np.interp(fine, t_s, values)
@@ -204,14 +206,23 @@ def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unsaid(
-    t_s: np.ndarray, values: np.ndarray, grid: np.ndarray, within_s: float
+    t_s: np.ndarray,
+    values: np.ndarray,
+    grid: np.ndarray,
+    within_s: float,
+    speed: float,
 ) -> np.ndarray:
-    """Tells where targets act that may have been sent but are not in the record."""
+    """Tells where targets act that may have been sent but are not in the record.
+
+    Behind a limit of the speed a target acts until it is reached.
+    """
     silent = np.diff(t_s) > within_s
     moved = silent & (np.diff(values) != 0.0)
     hidden = np.zeros(len(grid), bool)
     for k in np.flatnonzero(moved):
-        hidden |= (grid > t_s[k]) & (grid < t_s[k + 1] + FORGOTTEN_S)
+        underway_s = abs(values[k + 1] - values[k]) / speed
+        stop = t_s[k + 1] + FORGOTTEN_S + underway_s
+        hidden |= (grid > t_s[k]) & (grid < stop)
     return hidden
 
 

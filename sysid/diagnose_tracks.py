@@ -90,9 +90,9 @@ def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointT
             raise InputError(logs[0].source, "joints", joint, valid)
     check_records(logs, mechanism)
     step_s = grid_step_s(logs, joints)
-    efforts = {joint: mechanism.drives[joint].effort for joint in joints}
+    drives = {joint: mechanism.drives[joint] for joint in joints}
     pieces = [
-        p for i, log in enumerate(logs) for p in pieces_of(log, i, efforts, step_s)
+        p for i, log in enumerate(logs) for p in pieces_of(log, i, drives, step_s)
     ]
     if not pieces:
         longest = max(float(np.ptp(log.t_s)) for log in logs)

@@ -1,5 +1,7 @@
 """Grid, coordinates and folds of the diagnosis."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -25,6 +27,8 @@ STAND = """
 <mujoco><worldbody><body><joint name="knee" axis="0 1 0"/>
 <inertial pos="0 0 -0.1" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
 </body></worldbody></mujoco>"""
+
+DRIVE = JointDrive(Figure(5.0), Figure(0.1, 0.1))
 
 
 def stand(**drive):
@@ -53,7 +57,7 @@ def test_pieces_end_where_the_clock_jumps():
     t_s = np.concatenate([np.arange(0.0, 4.0, 0.005), np.arange(4.5, 7.0, 0.005)])
     log = log_of(t_s, np.sin(t_s), np.sin(t_s))
     step = grid_step_s([log], ["knee"])
-    first, second = pieces_of(log, 0, {"knee": "tau"}, step)
+    first, second = pieces_of(log, 0, {"knee": DRIVE}, step)
     assert first.t_s[-1] < 4.0 < second.t_s[0]
     assert second.pos[10:-10, 0] == pytest.approx(np.sin(second.t_s)[10:-10], abs=1e-4)
     assert second.vel[20:-20, 0] == pytest.approx(np.cos(second.t_s)[20:-20], abs=1e-3)
@@ -87,14 +91,25 @@ def test_a_servo_that_is_off_has_no_target():
     """Angles go on without targets: those do not count; a message's target holds."""
     t_s = np.arange(0.0, 4.0, 0.005)
     cmd = np.where(t_s < 2.0, np.sin(t_s), np.nan)
-    off = pieces_of(log_of(t_s, cmd, np.sin(t_s)), 0, {"knee": "tau"}, 0.005)[0]
+    off = pieces_of(log_of(t_s, cmd, np.sin(t_s)), 0, {"knee": DRIVE}, 0.005)[0]
     assert off.valid[50:390, 0].all()
     assert not off.valid[402:, 0].any()
     rows = np.repeat(t_s, 2)
     told = np.where(np.arange(len(rows)) % 2 == 0, np.repeat(cmd, 2), np.nan)
     read = np.where(np.arange(len(rows)) % 2 == 1, np.sin(rows), np.nan)
-    on = pieces_of(log_of(rows, told, read), 0, {"knee": "tau"}, 0.005)[0]
+    on = pieces_of(log_of(rows, told, read), 0, {"knee": DRIVE}, 0.005)[0]
     assert on.valid[402:780, 0].all()
+
+
+def test_a_target_that_nobody_saw_acts_until_it_is_reached():
+    """Rows are missing in which the target jumps by 1 rad, at 2 rad/s at most."""
+    t_s = np.delete(np.arange(0.0, 6.0, 0.005), slice(400, 410))
+    log = log_of(t_s, np.where(t_s < 2.02, 0.0, 1.0), np.sin(t_s))
+    slow = replace(DRIVE, effects={"slew_limit": {"speed_rad_s": Figure(2.0)}})
+    for drive, until_s in ((DRIVE, 2.3), (slow, 2.8)):
+        valid = pieces_of(log, 0, {"knee": drive}, 0.005)[0].valid[:, 0]
+        assert not valid[402 : int(until_s / 0.005) - 1].any()
+        assert valid[int(until_s / 0.005) + 2 : -2].all()
 
 
 def test_targets_that_are_held():
