@@ -7,9 +7,12 @@ Every joint is searched for itself (`sysid.diagnose_search`); effects that sever
 joints share are told once, with where they act.
 """
 
+import os
 import time
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -67,7 +70,9 @@ def examine(
     if not logs:
         raise InputError("logs", "", "no record", "at least one")
     tracks = all_tracks(logs, mechanism)
-    examined = [_examined(track, logs, mechanism) for track in tracks]
+    with ThreadPoolExecutor(os.cpu_count()) as joints:
+        each = partial(_examined, logs=logs, mechanism=mechanism)
+        examined = list(joints.map(each, tracks))
     found = verdict_of(examined, mechanism, seed)
     return (
         Diagnosis(
