@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from sysid.diagnose_loud import loudness
 from sysid.diagnose_problem import Problem
 from sysid.fit import Fit, Task, fit_all
 
@@ -27,6 +28,7 @@ class Model:
         errors: mean squared weighted residual on all data (controller, mechanics); 1
             where noise is all that is left. Held-out folds would not tell: one that
             alone tells a figure is badly predicted without it.
+        loudness: what it pays for noise that it calls loud [nat].
     """
 
     effects: tuple[str, ...]
@@ -35,16 +37,20 @@ class Model:
     penalty: float
     fold_theta: Float[np.ndarray, "g n"]
     errors: Float[np.ndarray, "2"]
+    loudness: float
 
 
 def gain_nat(worse: Model, better: Model, samples: int) -> float:
-    """Returns ½ (S_worse − S_better) / max(1, s²), s² the error per sample left.
+    """Returns ½ (S_worse − S_better) / max(1, s²) + L_worse − L_better [nat].
+
+    s² is the error per sample left, L what a model pays for noise that it calls loud.
 
     The errors on all data must fall as much: a fold that alone tells a figure is badly
     predicted from its tolerance, and that is not the simulation's fault.
     """
     held, fitted = worse.score - better.score, worse.fit.cost - better.fit.cost
-    return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
+    gain = 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
+    return gain + worse.loudness - better.loudness
 
 
 def fit_models(
@@ -94,7 +100,8 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         penalty = _penalty(problem, tasks[k], effects, fit.theta)
         score = score + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
-        models.append(Model(tuple(effects), fit, score, penalty, kept, errors))
+        loud = loudness(problem, fit.theta, float(errors[1]))
+        models.append(Model(tuple(effects), fit, score, penalty, kept, errors, loud))
     return models
 
 

@@ -11,11 +11,8 @@ figure far out of its tolerance is a finding and not silently absorbed.
 
 from dataclasses import dataclass
 
-import jax.numpy as jnp
 import numpy as np
 
-from sysid.diagnose_forced import EVERY
-from sysid.diagnose_link import MOST_ROTOR, spring_noise
 from sysid.diagnose_model import Model, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
@@ -127,34 +124,14 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     """Tells whether a larger model is worth its effect."""
     samples = int(problem.counts().sum())
     gain = gain_nat(smaller, larger, samples)
-    gain += _louder(problem, smaller) - _louder(problem, larger)
     added = [e for e in larger.effects if e not in smaller.effects]
     # What an equation leaves of a large effect is not another effect.
-    least = ALIKE * gain_nat(base, smaller, samples)
+    counts, k = _strongest(problem, smaller, larger)
+    least = ALIKE * 0.5 * counts[k] * (base.errors[k] - smaller.errors[k])
     if all(problem.space.figured(e) for e in added):
         return gain > max(FIGURE_THRESHOLD, least)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     return gain > max(threshold, least) and _shares(problem, smaller, larger, base)
-
-
-def _louder(problem: Problem, model: Model) -> float:
-    """Returns n log A [nat] of a spring that makes the noise of n readings A times.
-
-    The density of readings falls with it: noise that is called loud is no explanation.
-    """
-    if "compliance" not in model.effects:
-        return 0.0
-    slots, track = problem.space.slots, problem.data.track
-    soft, rotor = (
-        float(slots[i].value(model.fit.theta[i]))
-        for i in problem.space.of("compliance")
-    )
-    whole = float(np.mean(np.asarray(track.inertia)))
-    rotor = min(rotor, MOST_ROTOR * whole)
-    heard = (track.noise[1, 0], track.noise[1, 3], EVERY * problem.data.dt)
-    inner, soft, rest = (jnp.full((1, 1), x) for x in (rotor, soft, whole - rotor))
-    loud = float(spring_noise(rest, inner, soft, *heard)[0, 0])
-    return float(problem.counts().reshape(2, -1)[1].sum()) * float(np.log(loud))
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
@@ -162,10 +139,15 @@ def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> boo
 
     A large effect in one residual must not hide a small one in the other.
     """
+    counts, k = _strongest(problem, smaller, larger)
+    removed = smaller.errors[k] - larger.errors[k]
+    return bool(removed > LEAST_SHARE * (base.errors[k] - 1.0) and counts[k])
+
+
+def _strongest(problem: Problem, smaller: Model, larger: Model) -> tuple:
+    """Returns the samples of both residuals, and in which of them most error goes."""
     counts = problem.counts().reshape(2, -1).sum(1)
-    removed = counts * (smaller.errors - larger.errors)
-    k = int(np.argmax(removed))
-    return bool(removed[k] > LEAST_SHARE * counts[k] * (base.errors[k] - 1.0))
+    return counts, int(np.argmax(counts * (smaller.errors - larger.errors)))
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
