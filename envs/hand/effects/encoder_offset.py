@@ -11,7 +11,7 @@ EFFECT = EffectKind(
     name="encoder_offset",
     equation="y = q + o, inside the servo's loop",
     parameters={
-        "offset_rad": Parameter("rad", -0.5, 0.5, normal(0.0, 0.03), identity=0.0)
+        "offset_rad": Parameter("rad", -1.5, 1.5, normal(0.0, 0.03), identity=0.0)
     },
     acts={Stage.ENCODER: _act},
     confusable_with={

@@ -30,7 +30,7 @@ def _load(params: Params, state, x, dt):
     return state, x.replace(load=x.load + change, around=around)
 
 
-_ANGLE = Parameter("rad", -0.5, 0.5, normal(0.0, 0.03), identity=0.0)
+_ANGLE = Parameter("rad", -1.5, 1.5, normal(0.0, 0.03), identity=0.0)
 
 EFFECT = EffectKind(
     name="mount_tilt",
