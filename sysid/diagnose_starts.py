@@ -23,7 +23,9 @@ TEETH = 16
 def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str, list]:
     """Returns the best starts of every effect: near the model, and from the figures.
 
-    A start counts by the error that is left when the nuisances follow it linearly.
+    A start counts by the error that is left when the nuisances follow it linearly. One
+    that changes nothing, a limit that the record does not reach, comes last: from there
+    no slope leads anywhere.
     """
     result: dict[str, list] = {name: [] for name in names}
     fitted, nominal = model.fit.theta, problem.space.base.copy()
@@ -32,11 +34,13 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     for origin, count in ((fitted, 2), (nominal, 1)):
         some = names if count == 2 else [n for n in names if not _comb(problem, n)]
         owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
-        costs = _linear_costs(problem, model, np.stack([t for _, t in owned]))
+        thetas = np.stack([origin, *(t for _, t in owned)])
+        rest, *costs = _linear_costs(problem, model, thetas)
+        idle = np.isclose(costs, rest, rtol=1e-6, atol=0.0)
         for name in some:
             mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
             few = count if len(mine) > 2 else 1
-            best = sorted(mine, key=lambda k: costs[k])[:few]
+            best = sorted(mine, key=lambda k: (idle[k], costs[k]))[:few]
             result[name] += [owned[k][1] for k in best]
     return result
 
