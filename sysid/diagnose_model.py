@@ -76,7 +76,9 @@ def _task(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task
     wide = np.where(deviation > 0, deviation, 1.0)
     comb = np.array([s.comb for s in space.slots])
     steps = np.where(comb, 3e-4 * np.maximum(np.abs(start), 1e-6), 0.0)
-    return Task(start, free, space.base, wide, low, high, steps)
+    # A limit that the smaller model does not reach has no slope there.
+    fresh = tuple(space.of(effects[-1])) if effects else ()
+    return Task(start, free, space.base, wide, low, high, steps, fresh)
 
 
 def _scored(problem, sets, tasks, fits) -> list[Model]:

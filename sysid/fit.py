@@ -26,6 +26,7 @@ class Task:
         center, deviation: of the prior, for all coordinates.
         low, high: bounds, for all coordinates.
         steps: of the differences, where a coordinate needs its own; else 0.
+        fresh: indices whose columns of the Jacobian are never shared.
     """
 
     start: Float[np.ndarray, " n"]
@@ -35,6 +36,7 @@ class Task:
     low: Float[np.ndarray, " n"]
     high: Float[np.ndarray, " n"]
     steps: Float[np.ndarray, " n"] | None = None
+    fresh: tuple[int, ...] = ()
 
     def penalty(self, theta: np.ndarray) -> float:
         """Squared distance from the prior's center."""
@@ -168,7 +170,7 @@ def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
     rows, places = [], []
     for state in live:
         for i in state.task.free:
-            if i in shared:
+            if i in shared and i not in state.task.fresh:
                 state.columns[i] = shared[i]
                 continue
             theta, step = state.theta.copy(), state.steps(i)
