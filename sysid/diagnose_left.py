@@ -17,11 +17,8 @@ import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_problem import CHANNELS, Problem
-from sysid.diagnose_search import Search
+from sysid.diagnose_search import EXCESS, Search
 from sysid.diagnose_space import Slot
-
-EXCESS = 1.5
-"""Squared error over the noise above which something may be left to explain."""
 
 LEFT = 0.2
 """Share of the removable squared error that a whole explanation may leave: its equation

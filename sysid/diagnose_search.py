@@ -27,6 +27,9 @@ REFINED = 3
 LEAST_SHARE = 0.03
 """Least share of the held-out error above noise that a cause must remove."""
 
+EXCESS = 1.5
+"""Squared error over the noise above which something may be left to explain."""
+
 BENT = 16.0
 """Penalty of figures above which a fit is also continued from the figures."""
 
@@ -104,7 +107,7 @@ def _searched(problem: Problem, base: Model) -> Search:
         worth = [m for m in stage if _worth(problem, best, m, base)]
         if not worth:
             break
-        winner = worth[0]
+        winner = _fullest(worth)
         again = _beside(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
             if not _worth(problem, again, winner, base):
@@ -121,6 +124,17 @@ def _searched(problem: Problem, base: Model) -> Search:
     else:
         best, rivals, without = _exchanged(problem, best, base)
     return Search(problem, base, best, rivals, without, samples)
+
+
+def _fullest(worth: list[Model]) -> Model:
+    """Chooses the first effect, or one that explains what the first leaves.
+
+    Where one moment alone tells a figure, folds without it do not predict that moment,
+    however true the figure is.
+    """
+    first, full = worth[0], min(worth, key=lambda m: m.errors.max())
+    left, rest = first.errors.max() - 1.0, full.errors.max() - 1.0
+    return full if left > EXCESS - 1.0 and rest < 0.5 * left else first
 
 
 def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
