@@ -288,7 +288,12 @@ def _exchanged(
         rivals, without = _swapped(problem, best, base)
         for cause, stage in rivals.items():
             least = NEARLY * gain_nat(without[cause], best, samples)
-            better = [m for m in stage if gain_nat(best, m, samples) > max(3.0, least)]
+            better = [
+                m
+                for m in stage
+                if gain_nat(best, m, samples) > max(3.0, least)
+                and _worth(problem, without[cause], m, base)
+            ]
             if better:
                 break
         else:
