@@ -12,6 +12,7 @@ figure far out of its tolerance is a finding and not silently absorbed.
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 
 from sysid.diagnose_model import Model, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
@@ -143,8 +144,8 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     gain = gain_nat(smaller, larger, samples)
     added = [e for e in larger.effects if e not in smaller.effects]
     # What an equation leaves of a large effect is not another effect.
-    counts, k = _strongest(problem, smaller, larger)
-    least = ALIKE * 0.5 * counts[k] * (base.errors[k] - smaller.errors[k])
+    k = _strongest(problem, smaller, larger)
+    least = ALIKE * 0.5 * (_parts(problem, base) - _parts(problem, smaller))[k]
     if all(problem.space.figured(e) for e in added):
         return gain > max(FIGURE_THRESHOLD, least)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
@@ -152,19 +153,26 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
-    """Tells whether enough of an error goes, in the residual where most of it goes.
+    """Tells whether enough of an error goes, where most of it goes.
 
-    A large effect in one residual must not hide a small one in the other.
+    A large effect in one residual must not hide a small one in the other, nor one that
+    the figures hide by bending out of their tolerances.
     """
-    counts, k = _strongest(problem, smaller, larger)
-    removed = smaller.errors[k] - larger.errors[k]
-    return bool(removed > LEAST_SHARE * (base.errors[k] - 1.0) and counts[k])
+    k = _strongest(problem, smaller, larger)
+    noise = [*problem.counts().reshape(2, -1).sum(1), 0.0]
+    removed = _parts(problem, smaller)[k] - _parts(problem, larger)[k]
+    return bool(removed > LEAST_SHARE * (_parts(problem, base)[k] - noise[k]))
 
 
-def _strongest(problem: Problem, smaller: Model, larger: Model) -> tuple:
-    """Returns the samples of both residuals, and in which of them most error goes."""
+def _strongest(problem: Problem, smaller: Model, larger: Model) -> int:
+    """Returns the part in which most of the error goes."""
+    return int(np.argmax(_parts(problem, smaller) - _parts(problem, larger)))
+
+
+def _parts(problem: Problem, model: Model) -> Float[np.ndarray, "3"]:
+    """Returns the squared errors of both residuals, and of the figures."""
     counts = problem.counts().reshape(2, -1).sum(1)
-    return counts, int(np.argmax(counts * (smaller.errors - larger.errors)))
+    return np.append(counts * model.errors, model.penalty)
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
