@@ -17,16 +17,13 @@ import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_problem import CHANNELS, Problem
-from sysid.diagnose_search import EXCESS, Search
+from sysid.diagnose_search import BELIEVED, EXCESS, Search
 from sysid.diagnose_space import Slot
 
 LEFT = 0.2
 """Share of the removable squared error that a whole explanation may leave: its equation
 is right to half of its trace. A friction that falls with speed leaves 0.17 about its
 reversals, a slack cable behind shifted loads 0.15 to 0.9."""
-
-BENT = 5.0
-"""Prior deviations from its figure at which a nuisance is no longer believed."""
 
 FAR = 8.0
 """Deviations of the noise that no sample of it reaches."""
@@ -76,7 +73,7 @@ def _bent(found: Search) -> list[str]:
         if slot.effect in best.effects or not np.isfinite(slot.tight):
             continue
         away = abs(best.fit.theta[i] - slot.base) / slot.tight
-        if away > BENT:
+        if away > BELIEVED:
             name = f"{slot.effect}.{slot.name}".lstrip(".")
             texts.append(f"{name} lies {away:.0f} deviations from its figure")
     return texts

@@ -31,6 +31,9 @@ LEAST_SHARE = 0.03
 EXCESS = 1.5
 """Squared error over the noise above which something may be left to explain."""
 
+BELIEVED = 5.0
+"""Prior deviations from its figure up to which a nuisance is believed."""
+
 BENT = 16.0
 """Penalty of figures above which a fit is also continued from the figures."""
 
@@ -147,9 +150,20 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     k = _strongest(problem, smaller, larger)
     least = ALIKE * 0.5 * (_parts(problem, base) - _parts(problem, smaller))[k]
     if all(problem.space.figured(e) for e in added):
-        return gain > max(FIGURE_THRESHOLD, least)
+        believed = all(bent(problem, smaller, e) <= BELIEVED for e in added)
+        return gain > max(FIGURE_THRESHOLD, least if believed else 0.0)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     return gain > max(threshold, least) and _shares(problem, smaller, larger, base)
+
+
+def bent(problem: Problem, model: Model, effect: str) -> float:
+    """Returns how far an effect's figures lie from where they are [deviations]."""
+    away = [
+        abs(model.fit.theta[i] - slot.base) / slot.tight
+        for i, slot in enumerate(problem.space.slots)
+        if slot.effect == effect and 0.0 < slot.tight < np.inf
+    ]
+    return max(away, default=0.0)
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
