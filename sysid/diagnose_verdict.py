@@ -191,12 +191,23 @@ def _leading(searched, causes):
 
 
 def _alternatives(found: Search) -> tuple[Alternative, ...]:
-    """Returns the rivals of the strongest cause.
+    """Returns the rivals of the strongest cause, and those like one of the others."""
+    first, *others = sorted(found.best.effects, key=lambda e: -_evidence(found, e))
+    alike = [
+        rival
+        for cause in others
+        for rival in _rivals(found, cause)
+        if not rival.distinguishable
+    ]
+    return (*_rivals(found, first), *alike)
+
+
+def _rivals(found: Search, cause: str) -> list[Alternative]:
+    """Returns the effects that could stand in the place of a cause, nearest first.
 
     Dry friction over a presliding range of nothing, say, is the cause itself in another
     dress.
     """
-    cause = max(found.best.effects, key=lambda e: _evidence(found, e))
     gain = _evidence(found, cause)
     without = found.without.get(cause, found.base)
     result = []
@@ -207,8 +218,8 @@ def _alternatives(found: Search) -> tuple[Alternative, ...]:
         # Chance alone gives some effects as much as a figure's small step is worth.
         told = told or (gain - gap < THRESHOLD and not _confusable(effect, cause))
         if np.isfinite(gap) and gap < 0.9 * gain:
-            result.append(Alternative(effect, round(gap, 3), bool(told)))
-    return tuple(sorted(result, key=lambda a: a.score_gap)[:8])
+            result.append(Alternative(effect, round(gap, 3), bool(told), cause))
+    return sorted(result, key=lambda a: a.score_gap)[:8]
 
 
 def _confusable(one: str, other: str) -> bool:

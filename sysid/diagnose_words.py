@@ -31,8 +31,8 @@ def warnings_of(found: Search) -> list[str]:
 def next_experiment(verdict, causes, rivals, blind) -> str:
     """Proposes what to record next."""
     if verdict == "ambiguous":
-        rival = next(r.effect for r in rivals if not r.distinguishable)
-        first = causes[0].effect
+        nearest = next(r for r in rivals if not r.distinguishable)
+        rival, first = nearest.effect, nearest.cause or causes[0].effect
         hint = CATALOGUE[first].confusable_with.get(rival) or CATALOGUE[
             rival
         ].confusable_with.get(first)
@@ -75,6 +75,17 @@ def summary_of(verdict, causes, alternatives, gain, blind, left) -> str:
     if verdict == "unexplained":
         return f"Known effects explain too little; the nearest is {names}.{share}"
     if verdict == "ambiguous":
-        same = ", ".join(a.effect for a in alternatives if not a.distinguishable)
-        return f"The simulation lacks {names}, or one of {same} instead.{share}"
+        return f"The simulation lacks {names}, or {_instead(alternatives)}.{share}"
     return f"The simulation lacks {names}.{share}"
+
+
+def _instead(alternatives) -> str:
+    """Says which effects may stand in the place of which causes."""
+    same: dict[str, list[str]] = {}
+    for rival in alternatives:
+        if not rival.distinguishable:
+            same.setdefault(rival.cause, []).append(rival.effect)
+    return " and ".join(
+        f"one of {', '.join(effects)} instead of {cause}"
+        for cause, effects in same.items()
+    )

@@ -38,17 +38,19 @@ class Cause:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A rival of the first cause.
+    """A rival of a cause.
 
     Attributes:
         effect: name in the catalogue.
         score_gap: how much worse it predicts held-out data [nat].
         distinguishable: whether these records tell it apart from the cause.
+        cause: in whose place it would be; "" where there is one cause only.
     """
 
     effect: str
     score_gap: float
     distinguishable: bool
+    cause: str = ""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,8 @@ class Row:
         verdict: of the diagnosis, `error` if it raised.
         causes: names in order of gain.
         where: where each cause acts.
-        rivals: alternatives that are not distinguishable.
+        rivals: alternatives that are not distinguishable from the first cause.
+        others: those that are not distinguishable from one of the further causes.
         not_observable: effects that the diagnosis says it could not see.
         errors: relative size errors by parameter.
         covered: by parameter, whether the interval has the truth.
@@ -53,6 +54,7 @@ class Row:
     causes: tuple[str, ...] = ()
     where: tuple[str, ...] = ()
     rivals: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
     not_observable: tuple[str, ...] = ()
     errors: dict[str, float] = field(default_factory=dict)
     covered: dict[str, bool] = field(default_factory=dict)
@@ -64,6 +66,15 @@ class Row:
     def named(self) -> set[str]:
         """The first cause and what cannot be told from it."""
         return {*self.causes[:1], *self.rivals} if self.causes else set()
+
+    @property
+    def has_both(self) -> bool:
+        """Whether the effects of a pair are causes, or named beside one.
+
+        One cause with its rivals stands for one effect only.
+        """
+        said = {*self.causes, *self.rivals, *self.others}
+        return set(self.effects) <= said and len(self.causes) >= len(self.effects)
 
     @property
     def right(self) -> bool:
@@ -91,7 +102,7 @@ class Row:
     def from_json(line: str) -> "Row":
         """Reads `to_json`."""
         data = json.loads(line)
-        lists = ("effects", "causes", "where", "rivals", "not_observable")
+        lists = ("effects", "causes", "where", "rivals", "others", "not_observable")
         return Row(**{k: tuple(v) if k in lists else v for k, v in data.items()})
 
 
@@ -129,6 +140,7 @@ def figures(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
     }
     doubles = groups["double"]
     result["both of two"] = _rate(set(r.effects) <= set(r.causes) for r in doubles)
+    result["both of two, in the named sets"] = _rate(r.has_both for r in doubles)
     result["outside: unexplained"] = _rate(
         r.verdict == "unexplained" for r in groups["outside"]
     )

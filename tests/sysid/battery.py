@@ -130,12 +130,14 @@ def run_task(task: Task) -> Row:
                         size = math.hypot(*true.values())
                     errors[key] = abs(estimate.value - true[name]) / size
                     covered[key] = bool(estimate.low <= true[name] <= estimate.high)
+    same = [a for a in said.alternatives if not a.distinguishable]
     return Row(
         **common,
         verdict=said.verdict,
         causes=tuple(c.effect for c in said.causes),
         where=tuple(c.where for c in said.causes),
-        rivals=tuple(a.effect for a in said.alternatives if not a.distinguishable),
+        rivals=tuple(a.effect for a in same if a.cause == said.causes[0].effect),
+        others=tuple(a.effect for a in same if a.cause != said.causes[0].effect),
         not_observable=said.not_observable,
         errors=errors,
         covered=covered,
