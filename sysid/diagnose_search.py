@@ -114,8 +114,10 @@ def _searched(problem: Problem, base: Model) -> Search:
         winner = _fullest(worth)
         again = _beside(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
-            if not _worth(problem, again, winner, base):
+            worth = [m for m in worth if _worth(problem, again, m, base)]
+            if not worth:
                 break
+            winner = _fullest(worth)
             if again.score < best.score:
                 base = again if not best.effects else base
         best = _pruned(problem, winner, base)
