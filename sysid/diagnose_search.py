@@ -275,10 +275,15 @@ def _simplest_first(
     gains = {m.effects: gain_nat(smaller, m, samples) for m in stage}
     most, best = gains[stage[0].effects], stage[0].effects[-1]
 
-    def close(m: Model) -> float:
-        return NEARLY if best in NESTED.get(m.effects[-1], ()) else ALIKE
+    def tie(m: Model) -> bool:
+        behind = most - gains[m.effects]
+        if best not in NESTED.get(m.effects[-1], ()):
+            return behind < max(3.0, ALIKE * most)
+        # What the equation leaves of large friction is not that it falls with speed.
+        left = gain_nat(m, stage[0], samples)
+        return behind < max(3.0, NEARLY * most) or left < ALIKE * most
 
-    tied = [m for m in stage if most - gains[m.effects] < max(3.0, close(m) * most)]
+    tied = [m for m in stage if tie(m)]
     first = min(
         tied, key=lambda m: (len(problem.space.of(m.effects[-1])), -gains[m.effects])
     )
