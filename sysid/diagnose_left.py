@@ -10,7 +10,7 @@ that the joint can have. A wrong one that comes near
 What happens now and then, and not again when the motion is repeated, passes for noise;
 but noise of readings has no samples far out: on 36 effect-free records none lies beyond
 6.5 deviations. Where an effect is named, sticking that ends a little earlier in one
-repeat than in the next is no news.
+repeat than in the next is no news to the mechanics; the controller does not stick.
 """
 
 import numpy as np
@@ -82,12 +82,13 @@ def _bent(found: Search) -> list[str]:
 def _irregular(found: Search) -> list[str]:
     """Finds what repeats of the motion do not repeat."""
     problem = found.problem
-    if not problem.repeat or found.best.effects:
+    if not problem.repeat:
         return []
     raw = problem.raw(found.best.fit.theta[None])[0]
     texts = []
     for k, name in enumerate(CHANNELS):
-        if _jumps(problem, raw[k], k):
+        sticks = name == "mechanics" and found.best.effects
+        if not sticks and _jumps(problem, raw[k], k):
             texts.append(f"the {name} residual has jumps that do not repeat")
     return texts
 
