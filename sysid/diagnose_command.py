@@ -29,12 +29,17 @@ EFFECTS = (
 )
 """Effects that act here."""
 
+WITHIN = (0.35, 0.7)
+"""Times within a step at which the command is told too [steps]."""
+
+_WITHIN = jnp.asarray(WITHIN)[:, None, None]
+
 Params = dict[str, dict[str, Float[Array, " c"]]]
 
 
 def command_path(
     held: Float[Array, "t s p"], sent: Float[Array, "t s p"], params: Params, dt: float
-) -> tuple[Float[Array, "t p c"], Float[Array, "t p c"]]:
+) -> tuple[Float[Array, "t p c"], Float[Array, "t p c"], Float[Array, "t k p c"]]:
     """Returns the commands of candidates c at the steps of the grid [rad or m].
 
     Args:
@@ -46,7 +51,8 @@ def command_path(
     Returns:
         The commands, and their ripple: the mean about a step less what a smooth curve
         through the commands at the steps would have there. A servo that is read as
-        often as targets come is always met at the same place of their saw.
+        often as targets come is always met at the same place of their saw. Last what
+        they still go at the times `WITHIN` until the end of the step.
     """
     given = {name: value for name, value in params.items() if name in EFFECTS}
     count = next(x for v in params.values() for x in v.values()).shape[0]
@@ -68,8 +74,8 @@ def command_path(
         begin = jnp.clip(times[..., None] + (age - whole) + 1.0, 0.0, 1.0)
         begin = begin.at[0].set(0.0)
         parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
-        total = jnp.zeros_like(command)
-        for target, part in zip(targets, parts, strict=True):
+        total, passed = jnp.zeros_like(command), command
+        for target, start, part in zip(targets, begin, parts, strict=True):
             # No time at all would make 0 × ∞ of an absent limit.
             h = jnp.maximum(part, 1e-6) * dt
             last, before = smooth, command
@@ -79,15 +85,22 @@ def command_path(
             follows = (before == last) & (command == smooth)
             mean = goal - (smooth - last) * lag_s / h
             total += part * jnp.where(follows, mean, 0.5 * (before + command))
-        return (smooth, command), (command, total)
+            h = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
+            there = filtered(last, goal, cutoff, h)
+            there = _pursuit(before, last, there, speed, h)
+            passed = jnp.where(_WITHIN > start, there, passed)
+        return (smooth, command), (command, total, command - passed)
 
     first = quantized(held[0, 0][:, None], grid)
     first = jnp.broadcast_to(first, (held.shape[2], count))
-    path, mean = jax.lax.scan(step, (first, first), (held, sent))[1]
+    path, mean, ahead = jax.lax.scan(step, (first, first), (held, sent))[1]
     t_s = dt * jnp.arange(len(held))[:, None]
     drift = 1e-6 * value("clock_drift", "drift_ppm", 0.0)
     steps = whole + drift * t_s / dt
-    return _late(path, steps), _late(_ripple(path, mean), steps)
+    place = jnp.arange(len(path))[:, None] - jnp.round(steps)
+    place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
+    ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
+    return _late(path, steps), _late(_ripple(path, mean), steps), ahead
 
 
 def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):

@@ -31,6 +31,7 @@ from envs.hand.effects.surroundings import Gravity, Surroundings
 from sysid import diagnose_command as command
 from sysid import diagnose_link as link
 from sysid.diagnose_grid import SMOOTH_STEPS
+from sysid.diagnose_slope import SLOPE, within_steps
 
 BAND_STEPS = 2.2
 """Width of the Gaussian through which both residuals pass [steps of the grid]."""
@@ -158,6 +159,7 @@ KINDS = {
 """Effects that act behind the command path."""
 
 _RIGID = {n: kind for n, kind in KINDS.items() if n not in link.EFFECTS}
+_RIGID[SLOPE.name] = SLOPE
 
 
 @partial(jax.jit, static_argnames=("dt", "names"))
@@ -189,7 +191,7 @@ def forced_residuals(
         dt: step of the grid [s].
         names: effects in the order of the chain.
     """
-    path, ripple = command.command_path(track.held, track.sent, params, dt)
+    path, ripple, ahead = command.command_path(track.held, track.sent, params, dt)
     ripple = track.between * ripple
     wide = {
         n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in _RIGID
@@ -202,24 +204,45 @@ def forced_residuals(
     heard = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
     shaken = link.spring_noise(whole - inner, inner, soft, *heard)
 
-    def model(now, ripple):
+    def smooth_read(now):
+        """Returns angle and speed that the encoder told, as they were smoothed."""
+        return (
+            now["pos"] + skew * now["vel"],
+            now["vel"] + skew * now["acc"],
+        )
+
+    def sharp_read(now):
+        """Returns them before they were smoothed."""
+        angle, speed = smooth_read(now)
+        return (
+            angle - dull * (now["acc"] + skew * now["jerk"]),
+            speed - dull * now["jerk"],
+        )
+
+    def model(now, ripple, ahead):
         effort = gain * now["effort"]
         measured = track.measured[:, None]
         enter = {"effort": effort, "measured": measured, "ripple": ripple}
         slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
-        body = tuple((_RIGID[n], p) for n, p in wide.items())
-        angle = now["pos"] + skew * now["vel"]
-        read = {"angle": angle, "speed": now["vel"] + skew * now["acc"]}
-        return ((_SLOW, slow), *body, (_READ, read), (_ENTER, enter))
+        moved, turned, eased = (x[:, :, None] for x in now["within"])
+        within = {
+            "error": ahead - moved - skew * turned,
+            "speed": turned + skew * eased,
+        }
+        body = (
+            (_RIGID[n], p | within if n == SLOPE.name else p) for n, p in wide.items()
+        )
+        told = dict(zip(("angle", "speed"), sharp_read(now), strict=True))
+        return ((_SLOW, slow), *body, (_READ, told), (_ENTER, enter))
 
     def step(carry, row):
         states, last, told, steep, behind = carry
-        row, target, ripple = row
-        now = {k: v[:, None] for k, v in row.items()}
-        angle = now["pos"] + skew * now["vel"]
+        row, within, target, ripple, ahead = row
+        now = {k: v[:, None] for k, v in row.items()} | {"within": within}
+        angle, rate = smooth_read(now)
         # The angle of which the encoder would tell this: a step of Newton's method.
         q = last + (angle - told) / steep
-        qd = (now["vel"] + skew * now["acc"]) / steep
+        qd = rate / steep
         away = (q - angle + behind[0])[..., None]
         moment = jnp.cos(away) * now["moment"] + jnp.sin(away) * now["turned"]
         moment = mass[..., None] * moment
@@ -241,10 +264,12 @@ def forced_residuals(
         )
         kp, kd = track.kp[:, None], track.kd[:, None]
         states, x = chain_step(
-            model(now, ripple), states, target, q, qd, load, kp, kd, dt, around
+            model(now, ripple, ahead), states, target, q, qd, load, kp, kd, dt, around
         )
         inertia = mass * now["inertia"] + x.inertia
-        loud, usual = _loudness(track, now, x, gain, inertia / steep)
+        bears = states[ramp][1] if ramp else 0.0
+        share = jnp.maximum(x.follows, bears)
+        loud, usual = _loudness(track, now, x, share, gain, inertia / steep)
         own = jnp.minimum(rotor, link.MOST_ROTOR * inertia)
         # What encoders make of angles is as steep for speeds and accelerations.
         moves = jnp.abs(qd) > 1e-6
@@ -257,28 +282,38 @@ def forced_residuals(
         behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
         needs = x.torque - own * acc + pull
         unit = gain * shaken * loud[1] / usual[1]
-        quiet = loud[0] / usual[0]
+        servo, (true_angle, true_rate) = states[-1], sharp_read(now)
+        enters = (1.0 - track.measured[:, None]) / unit
         out = {
-            "servo": (now["effort"] - states[-1] / gain) / quiet,
-            "needs": needs / unit,
-            "follow": x.follows * x.kp / gain / quiet,
-            "enters": (1.0 - track.measured[:, None]) / unit * gain * quiet,
+            "command": (servo + x.kp * true_angle + x.kd * true_rate) / gain,
+            "answer": (x.kp * angle + x.kd * rate) / gain,
+            "quiet": loud[0] / usual[0],
+            "needs": needs / unit - enters * servo,
+            "enters": gain * enters,
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
         }
         return (states, q, encoder, steep, behind), out
 
+    dull = 0.5 * (SMOOTH_STEPS * dt) ** 2
+    ramp = 1 + list(wide).index(SLOPE.name) if SLOPE.name in wide else 0
     rows = {k: getattr(track, k) for k in _STEPWISE}
+    angle, speed = track.pos - dull * track.acc, track.vel - dull * track.jerk
+    within = (
+        within_steps(angle, speed, dt),
+        within_steps(speed, track.acc, dt),
+        within_steps(track.acc, track.jerk, dt),
+    )
     first = {k: v[0][:, None] for k, v in rows.items()}
     q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
     none = jnp.zeros_like(q0)
     read = q0 + skew * first["vel"]
-    states = init_states(model(first, ripple[0]), path[0], q0, dt)
+    at_rest = first | {"within": tuple(x[0] for x in within)}
+    states = init_states(model(at_rest, ripple[0], ahead[0]), path[0], q0, dt)
     start = (states, read, read, none + 1.0, (none, none))
-    out = jax.lax.scan(step, start, (rows, path, ripple))[1]
-    return _filtered(
-        out | {"command": path}, track.slow_vel[:, :, None], friction_speed
-    )
+    out = jax.lax.scan(step, start, (rows, within, path, ripple, ahead))[1]
+    vel, effort = track.slow_vel[:, :, None], track.effort[:, :, None]
+    return _filtered(out, effort, vel, friction_speed)
 
 
 def _between(params, rotor):
@@ -292,13 +327,16 @@ def _between(params, rotor):
     return gap, soft, jnp.where(soft > 0.0, own, rotor)
 
 
-def _loudness(track, now, x, gain, inertia):
-    """Noise of the residuals of a candidate, and as the simulation stands [N·m]."""
+def _loudness(track, now, x, share, gain, inertia):
+    """Noise of the residuals of a candidate, and as the simulation stands [N·m].
+
+    The servo's torque has its share of the noise that its gains make.
+    """
     kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
     servo, usual_servo = [], []
     for angle, speed, _, _ in track.noise:
         # A servo at its limit does not answer to the noise of the angle.
-        servo.append(x.follows * jnp.hypot(x.kp * angle, x.kd * speed) / gain)
+        servo.append(share * jnp.hypot(x.kp * angle, x.kd * speed) / gain)
         usual_servo.append(jnp.hypot(kp * angle, kd * speed))
     _, speed, acc, effort = track.noise[1]
     own = jnp.hypot(inertia * acc, x.viscous * speed) / gain
@@ -311,17 +349,21 @@ def _loudness(track, now, x, gain, inertia):
     return loud, usual
 
 
-def _filtered(out, vel, friction_speed):
-    """Passes the signals through the band and subtracts friction."""
+def _filtered(out, effort, vel, friction_speed):
+    """Passes the signals through the band and subtracts friction.
+
+    The servo's torque is smoothed as the measured one was; its answer to angle and
+    speed was smoothed with them.
+    """
     way = jnp.clip(vel / friction_speed, -1.0, 1.0)
-    rounded = out["follow"] * (_smooth(out["command"]) - out["command"])
+    servo = _smooth(out["command"]) - out["answer"]
     needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
-    mechanics = _band(needs + out["enters"] * rounded)
-    return jnp.stack([_band(out["servo"] - rounded), mechanics])
+    mechanics = _band(needs + out["enters"] * servo)
+    return jnp.stack([_band((effort - servo) / out["quiet"]), mechanics])
 
 
 def _smooth(x: Float[Array, "t p c"]) -> Float[Array, "t p c"]:
-    """Smooths the command as the measured channels were.
+    """Smooths a torque as the measured channels were.
 
     The target is not smoothed before the chain: limits would act on round corners.
     """
