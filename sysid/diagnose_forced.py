@@ -267,8 +267,7 @@ def forced_residuals(
             model(now, ripple, ahead), states, target, q, qd, load, kp, kd, dt, around
         )
         inertia = mass * now["inertia"] + x.inertia
-        bears = states[ramp][1] if ramp else 0.0
-        share = jnp.maximum(x.follows, bears)
+        share = jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0)
         loud, usual = _loudness(track, now, x, share, gain, inertia / steep)
         own = jnp.minimum(rotor, link.MOST_ROTOR * inertia)
         # What encoders make of angles is as steep for speeds and accelerations.
@@ -279,7 +278,14 @@ def forced_residuals(
         acc = now["acc"] + (skew + hold) * now["jerk"]
         acc = (acc - (steep - before) / dt * qd) / steep  # y = f(q), ÿ = f' q̈ + ḟ' q̇
         force = x.passive + x.load - (inertia - own) * acc
-        behind, pull = link.link_step(behind, force, inertia - own, gap, soft, dt)
+        outer = inertia - own
+        sharp = force + outer * dull * now["snap"] / steep
+        way = jnp.clip(now["slow_vel"] / friction_speed, -1.0, 1.0)
+        bears = x.passive + x.load - x.viscous * now["slow_vel"] - x.friction * way
+        touch = (own * bears - outer * x.torque) / inertia
+        behind, pull, loose = link.link_step(
+            behind, force, sharp, touch, outer, gap, soft, dt
+        )
         needs = x.torque - own * acc + pull
         unit = gain * shaken * loud[1] / usual[1]
         servo, (true_angle, true_rate) = states[-1], sharp_read(now)
@@ -289,6 +295,7 @@ def forced_residuals(
             "answer": (x.kp * angle + x.kd * rate) / gain,
             "quiet": loud[0] / usual[0],
             "needs": needs / unit - enters * servo,
+            "loose": loose / unit,
             "enters": gain * enters,
             "friction": x.friction / unit,
             "viscous": x.viscous / unit,
@@ -298,6 +305,7 @@ def forced_residuals(
     dull = 0.5 * (SMOOTH_STEPS * dt) ** 2
     ramp = 1 + list(wide).index(SLOPE.name) if SLOPE.name in wide else 0
     rows = {k: getattr(track, k) for k in _STEPWISE}
+    rows["snap"] = jnp.gradient(track.jerk, dt, axis=0)
     angle, speed = track.pos - dull * track.acc, track.vel - dull * track.jerk
     within = (
         within_steps(angle, speed, dt),
@@ -358,7 +366,7 @@ def _filtered(out, effort, vel, friction_speed):
     way = jnp.clip(vel / friction_speed, -1.0, 1.0)
     servo = _smooth(out["command"]) - out["answer"]
     needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
-    mechanics = _band(needs + out["enters"] * servo)
+    mechanics = _band(needs + _smooth(out["loose"]) + out["enters"] * servo)
     return jnp.stack([_band((effort - servo) / out["quiet"]), mechanics])
 
 

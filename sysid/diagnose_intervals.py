@@ -6,7 +6,8 @@ Three things count, as deviations of a coordinate:
     excitation    H⁻¹ (Σ_b g_b g_bᵀ) H⁻¹, g_b the slope of the error on stretch b
     the unknown   what a servo's own cycle does to figures of its command path; what a
                   grid's size may change by without another target on it; that a spring
-                  is told by a resonance whose damping ratio is only assumed
+                  is told by a resonance whose damping ratio is only assumed, and play
+                  by flights between walls that are assumed to give no speed back
 
 The second is larger than the first where stretches of a record contradict each other,
 as they do where the model is not quite true or its errors hang together.
@@ -28,6 +29,10 @@ from sysid.diagnose_tracks import JointTrack
 COMB_SHARE = 1.5e-4
 """Deviation of a grid's size, relative: half the step by which its slope is found,
 within which one target more or less falls on another tooth."""
+
+BOUNCE = 0.04
+"""Deviation of a play, relative, because of what its walls give back: with a restitution
+of 0.15 light joints, whose links fly for long, come out smaller by up to a tenth."""
 
 STRETCH_S = 0.5
 """Length of the stretches of a record that are compared [s]."""
@@ -81,6 +86,8 @@ def _unknown(slot: Slot, u: float, data: JointTrack) -> float:
         return COMB_SHARE * abs(u)
     if slot.effect == "compliance":
         return DAMPING * (u if slot.kind == "linear" else 1.0)
+    if slot.effect == "backlash":
+        return BOUNCE * abs(u)
     return _timing(slot, data)
 
 

@@ -67,43 +67,55 @@ def spring_noise(
 def link_step(
     state: State,
     force: Float[Array, "p c"],
+    sharp: Float[Array, "p c"],
+    touch: Float[Array, "p c"],
     inertia: Float[Array, "p c"],
     gap_rad: Float[Array, "p c"],
     compliance: Float[Array, "p c"],
     dt: float,
-) -> tuple[State, Float[Array, "p c"]]:
+) -> tuple[State, Float[Array, "p c"], Float[Array, "p c"]]:
     """Advances the link by a step.
+
+    A spring passes on what smoothing did to the motor's motion. Play does not: the blow
+    of a wall, smoothed over the time before it, would brake the link before it is there.
 
     Args:
         state: at the beginning of the step.
-        force: F [N·m].
+        force: F, of the motion as it was smoothed [N·m].
+        sharp: F, of the motion before [N·m].
+        touch: F, if motor and link moved as one under the motor's torque [N·m].
         inertia: of the link, J [kg·m²].
         gap_rad: play b; 0 for none.
         compliance: C of the spring [rad/(N·m)]; 0 for none. Play goes before it.
         dt: step [s].
 
     Returns:
-        The state at its end, and the mean pull on the motor during it [N·m].
+        The state at its end, and the mean pull on the motor during it [N·m]: of the
+        motion as it was smoothed, and what is still to be smoothed.
     """
     x, speed = state
     soft = _spring(x, speed, force, inertia, compliance, dt)
-    loose = _play(x, speed, force, inertia, 0.5 * gap_rad, dt)
+    loose = _play(x, speed, sharp, touch, inertia, 0.5 * gap_rad, dt)
     angle, rate = (
         jnp.where(gap_rad > 0.0, a, jnp.where(compliance > 0.0, b, 0.0))
         for a, b in zip(loose, soft, strict=True)
     )
-    return (angle, rate), force - inertia * (rate - speed) / dt
+    lost = inertia * (rate - speed) / dt
+    plays = gap_rad > 0.0
+    return (angle, rate), force - lost * ~plays, -lost * plays
 
 
-def _play(x, speed, force, inertia, half, dt) -> State:
-    """Flies freely, and stops at a wall.
+def _play(x, speed, sharp, touch, inertia, half, dt) -> State:
+    """Flies freely, stops at a wall, and rests there while the motor pushes it.
 
-    Angles belong to the steps of the grid and speeds to the middles between them, else
+    Whether it is pushed tells the motor's torque: the noise of its acceleration would
+    throw the link off, by about as much as angles are noisy. Angles belong to the steps of the grid and speeds to the middles between them, else
     a flight of n steps would go 1 + 1/n times as far. The last speed before a wall is
     the one that ends there.
     """
     place = jnp.clip(x + speed * dt, -half, half)
-    ahead = speed + force / inertia * dt
+    rests = (jnp.abs(place) >= half) & (touch * place > 0.0)
+    ahead = jnp.where(rests, 0.0, speed + sharp / inertia * dt)
     return place, jnp.clip(ahead, (-half - place) / dt, (half - place) / dt)
 
 

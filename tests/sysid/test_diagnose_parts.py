@@ -14,7 +14,7 @@ from envs.hand.effects.catalogue import CATALOGUE
 from envs.quiet_mujoco import mujoco
 from sysid.data import make_log
 from sysid.diagnose import diagnose, problem_of
-from sysid.diagnose_command import command_path
+from sysid.diagnose_command import WITHIN, command_path
 from sysid.diagnose_grid import held_targets, shares, smoothed
 from sysid.diagnose_link import link_step, spring_noise
 from sysid.diagnose_records import grid_step_s, pieces_of
@@ -140,7 +140,7 @@ def test_a_command_between_its_targets():
     made = command_path(
         jnp.array(held[..., None]), jnp.array(sent[..., None]), params, dt
     )
-    path, ripple = (np.asarray(x)[:, 0, 0] for x in made)
+    path, ripple = (np.asarray(x)[:, 0, 0] for x in made[:2])
     rows = slice(150, 350)
     every = round(dt / 1e-5)
     sampled = exact[::every]
@@ -148,6 +148,12 @@ def test_a_command_between_its_targets():
     mean = np.convolve(exact, np.ones(every) / every, "same")[::every]
     assert ripple[rows] == pytest.approx((mean - sampled)[rows], abs=1.2e-4)
     assert np.max(np.abs(ripple[rows])) > 5e-4
+    for k, time in enumerate(WITHIN):
+        still = np.asarray(made[2])[:, k, 0, 0]
+        there = exact[every - round((1.0 - time) * every) :: every]
+        assert still[rows] == pytest.approx(
+            (sampled[1:] - there[:-1])[149:349], abs=2e-4
+        )
 
 
 def test_coordinates_and_identity():
@@ -253,14 +259,26 @@ def test_a_link_flies_through_its_play():
     state = (-0.5 * gap * one, 0.0 * one)
     for k in range(1, 51):
         force = rise * k * dt * one
-        link = (force, inertia * one, gap * one, 0.0 * one, dt)
-        state, pull = link_step(state, *link)
+        link = (force, force, force, inertia * one, gap * one, 0.0 * one, dt)
+        state, pull, loose = link_step(state, *link)
         if k == 20:
             way = float(state[0][0, 0]) + 0.5 * gap
             assert way == pytest.approx(rise * (k * dt) ** 3 / 6.0 / inertia, rel=0.01)
-            assert float(pull[0, 0]) == pytest.approx(0.0, abs=1e-6)
+            assert float((pull + loose)[0, 0]) == pytest.approx(0.0, abs=1e-6)
     assert float(state[0][0, 0]) == pytest.approx(0.5 * gap)
-    assert float(pull[0, 0]) == pytest.approx(rise * 50 * dt)
+    assert float((pull + loose)[0, 0]) == pytest.approx(rise * 50 * dt)
+
+
+def test_a_link_rests_at_a_wall_while_the_motor_pushes_it():
+    """Noise of the motor's acceleration does not throw it off."""
+    one = jnp.ones((1, 1))
+    state, gap = (0.01 * one, 0.0 * one), 0.02 * one
+    noisy, pushed, rest = -0.3 * one, 0.1 * one, (1e-3 * one, gap, 0.0 * one, 0.005)
+    state, pull, loose = link_step(state, pushed, noisy, pushed, *rest)
+    assert float(state[1][0, 0]) == 0.0
+    assert float((pull + loose)[0, 0]) == pytest.approx(0.1)
+    state, _, _ = link_step(state, pushed, noisy, -pushed, *rest)
+    assert float(state[1][0, 0]) == pytest.approx(-0.3 / 1e-3 * 0.005)
 
 
 def test_a_spring_shakes_in_the_noise_of_its_motor():
