@@ -41,16 +41,24 @@ class Model:
 
 
 def gain_nat(worse: Model, better: Model, samples: int) -> float:
-    """Returns ½ (S_worse − S_better) / max(1, s²) + L_worse − L_better [nat].
+    """Returns the gain in error [nat], less what is gained by calling noise loud.
 
-    s² is the error per sample left, L what a model pays for noise that it calls loud.
+    A spring that both have drifts from fit to fit: that it calls less is no merit.
+    """
+    quieter = worse.loudness - better.loudness
+    if worse.loudness > 0.0 and better.loudness > 0.0:
+        quieter = min(quieter, 0.0)
+    return error_nat(worse, better, samples) + quieter
+
+
+def error_nat(worse: Model, better: Model, samples: int) -> float:
+    """Returns ½ (S_worse − S_better) / max(1, s²), s² the error per sample left.
 
     The errors on all data must fall as much: a fold that alone tells a figure is badly
     predicted from its tolerance, and that is not the simulation's fault.
     """
     held, fitted = worse.score - better.score, worse.fit.cost - better.fit.cost
-    gain = 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
-    return gain + worse.loudness - better.loudness
+    return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
 
 
 def fit_models(

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnose_model import Model, fit_models, gain_nat
+from sysid.diagnose_model import Model, error_nat, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_starts import starts_of
@@ -152,8 +152,10 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     k = _strongest(problem, smaller, larger)
     least = ALIKE * 0.5 * (_parts(problem, base) - _parts(problem, smaller))[k]
     if all(problem.space.figured(e) for e in added):
-        believed = all(bent(problem, smaller, e) <= BELIEVED for e in added)
-        return gain > max(FIGURE_THRESHOLD, least if believed else 0.0)
+        if any(bent(problem, smaller, e) > BELIEVED for e in added):
+            # That the figure straightens is no matter of noise or of other effects.
+            return error_nat(smaller, larger, samples) > FIGURE_THRESHOLD
+        return gain > max(FIGURE_THRESHOLD, least)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     return gain > max(threshold, least) and _shares(problem, smaller, larger, base)
 
