@@ -88,7 +88,7 @@ def command_path(
             h = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
             there = filtered(last, goal, cutoff, h)
             there = _pursuit(before, last, there, speed, h)
-            passed = jnp.where(_WITHIN > start, there, passed)
+            passed += (start < _WITHIN) * (there - passed)
         return (smooth, command), (command, total, command - passed)
 
     first = quantized(held[0, 0][:, None], grid)

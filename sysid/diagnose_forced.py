@@ -232,8 +232,9 @@ def forced_residuals(
         body = (
             (_RIGID[n], p | within if n == SLOPE.name else p) for n, p in wide.items()
         )
-        told = dict(zip(("angle", "speed"), sharp_read(now), strict=True))
-        return ((_SLOW, slow), *body, (_READ, told), (_ENTER, enter))
+        angle, speed = sharp_read(now)
+        read = {"angle": angle, "speed": speed}
+        return ((_SLOW, slow), *body, (_READ, read), (_ENTER, enter))
 
     def step(carry, row):
         states, last, told, steep, behind = carry

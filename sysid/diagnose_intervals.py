@@ -31,8 +31,8 @@ COMB_SHARE = 1.5e-4
 within which one target more or less falls on another tooth."""
 
 BOUNCE = 0.04
-"""Deviation of a play, relative, because of what its walls give back: with a restitution
-of 0.15 light joints, whose links fly for long, come out smaller by up to a tenth."""
+"""Deviation of a play, relative, because of what its walls give back: a restitution of
+0.15 makes plays of light joints, whose links fly for long, a tenth too small."""
 
 STRETCH_S = 0.5
 """Length of the stretches of a record that are compared [s]."""

@@ -76,8 +76,8 @@ def link_step(
 ) -> tuple[State, Float[Array, "p c"], Float[Array, "p c"]]:
     """Advances the link by a step.
 
-    A spring passes on what smoothing did to the motor's motion. Play does not: the blow
-    of a wall, smoothed over the time before it, would brake the link before it is there.
+    A spring passes on what smoothing did to the motor's motion. Play does not: a
+    wall's blow, smoothed over the time before it, would brake the link on its way.
 
     Args:
         state: at the beginning of the step.
@@ -108,14 +108,14 @@ def link_step(
 def _play(x, speed, sharp, touch, inertia, half, dt) -> State:
     """Flies freely, stops at a wall, and rests there while the motor pushes it.
 
-    Whether it is pushed tells the motor's torque: the noise of its acceleration would
-    throw the link off, by about as much as angles are noisy. Angles belong to the steps of the grid and speeds to the middles between them, else
-    a flight of n steps would go 1 + 1/n times as far. The last speed before a wall is
-    the one that ends there.
+    The motor's torque tells whether it pushes: the noise of its acceleration would
+    throw the link off, by about as much as angles are noisy. Angles belong to the steps
+    of the grid and speeds to the middles between them, else a flight of n steps would
+    go 1 + 1/n times as far. The last speed before a wall is the one that ends there.
     """
     place = jnp.clip(x + speed * dt, -half, half)
     rests = (jnp.abs(place) >= half) & (touch * place > 0.0)
-    ahead = jnp.where(rests, 0.0, speed + sharp / inertia * dt)
+    ahead = (speed + sharp / inertia * dt) * ~rests
     return place, jnp.clip(ahead, (-half - place) / dt, (half - place) / dt)
 
 

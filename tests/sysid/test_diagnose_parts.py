@@ -143,14 +143,14 @@ def test_a_command_between_its_targets():
     path, ripple = (np.asarray(x)[:, 0, 0] for x in made[:2])
     rows = slice(150, 350)
     every = round(dt / 1e-5)
-    sampled = exact[::every]
+    sampled = np.asarray(exact)[::every]
     assert path[rows] == pytest.approx(sampled[rows], abs=1.2e-4)
     mean = np.convolve(exact, np.ones(every) / every, "same")[::every]
     assert ripple[rows] == pytest.approx((mean - sampled)[rows], abs=1.2e-4)
     assert np.max(np.abs(ripple[rows])) > 5e-4
     for k, time in enumerate(WITHIN):
         still = np.asarray(made[2])[:, k, 0, 0]
-        there = exact[every - round((1.0 - time) * every) :: every]
+        there = np.asarray(exact)[every - round((1.0 - time) * every) :: every]
         assert still[rows] == pytest.approx(
             (sampled[1:] - there[:-1])[149:349], abs=2e-4
         )
@@ -257,6 +257,7 @@ def test_a_link_flies_through_its_play():
     dt, inertia, rise, gap = 0.005, 1e-3, 0.5, 0.5
     one = jnp.ones((1, 1))
     state = (-0.5 * gap * one, 0.0 * one)
+    pull = loose = 0.0 * one
     for k in range(1, 51):
         force = rise * k * dt * one
         link = (force, force, force, inertia * one, gap * one, 0.0 * one, dt)
