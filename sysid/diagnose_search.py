@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from sysid.diagnose_link import EFFECTS as LINKED
 from sysid.diagnose_model import Model, error_nat, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
 from sysid.diagnose_problem import Problem
@@ -221,7 +222,7 @@ def _beside(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> Mo
 
 def extended(problem: Problem, model: Model) -> list[Model]:
     """Adds every effect that a model lacks, best first."""
-    names = [e for e in problem.space.effects if e not in model.effects]
+    names = [e for e in problem.space.effects if _fits_in(e, model.effects)]
     sets = [(*model.effects, name) for name in names]
     starts = starts_of(problem, model, names)
     jobs = [(s, t) for s, name in zip(sets, names, strict=True) for t in starts[name]]
@@ -233,6 +234,12 @@ def extended(problem: Problem, model: Model) -> list[Model]:
             best[m.effects] = m
     stage = _refined(problem, model, list(best.values()))
     return _simplest_first(problem, model, stage)
+
+
+def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:
+    """Tells whether an effect can act beside others: one thing moves the link."""
+    taken = effect in LINKED and any(e in LINKED for e in effects)
+    return effect not in effects and not taken
 
 
 def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
@@ -309,7 +316,8 @@ def _exchanged(
 ) -> tuple[Model, dict[str, list[Model]], dict[str, Model]]:
     """Lets other effects take the places of causes while that is better.
 
-    The first cause of several was chosen when it stood for all of them.
+    The first cause of several was chosen when it stood for all of them. One that is not
+    worth it beside the others goes.
 
     Returns:
         The model, and for each cause its rivals and the model without it.
@@ -317,6 +325,10 @@ def _exchanged(
     samples = int(problem.counts().sum())
     for _ in range(MOST):
         rivals, without = _swapped(problem, best, base)
+        idle = [c for c in best.effects if not _worth(problem, without[c], best, base)]
+        if idle and len(best.effects) > 1:
+            best = without[idle[0]]
+            continue
         for cause, stage in rivals.items():
             least = NEARLY * gain_nat(without[cause], best, samples)
             better = [

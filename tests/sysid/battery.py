@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from hidden.cases import RATIOS, draw_case
+from hidden.cases import RATIOS, Case, draw_case
 from hidden.score import Row, confusion, figures, report
 from hidden.sizes import SCALES
 from hidden.truth import OUTSIDE
@@ -98,10 +98,8 @@ def run_task(task: Task) -> Row:
     from sysid.diagnose import diagnose
 
     case = draw_case(task.seed, task.effects, task.magnitude, task.kind)
-    aim = RATIOS.get(task.magnitude, 1.0)
     kind = task.kind
-    if task.effects and case.ratio < 0.8 * aim and task.magnitude in RATIOS:
-        # A light joint cannot show it, however large it is: the pendulum can.
+    if not _shown(task, case):
         kind = "pendulum"
         case = draw_case(task.seed, task.effects, task.magnitude, kind)
     common = {
@@ -143,6 +141,27 @@ def run_task(task: Task) -> Row:
         covered=covered,
         explained=said.gain.explained_fraction if said.gain else None,
         runtime_s=time.perf_counter() - start,
+    )
+
+
+def _shown(task: Task, case: Case) -> bool:
+    """Tells whether a joint shows what is hidden, and stays within its range.
+
+    A light one cannot show some effects, however large they are, and others throw it
+    about: the pendulum can, and has a wide one.
+    """
+    from sysid.diagnose_checks import BEYOND_RAD
+
+    if not task.effects or task.magnitude not in RATIOS:
+        return True
+    if case.ratio < 0.8 * RATIOS[task.magnitude]:
+        return False
+    log = case.logs[0]
+    return all(
+        low - BEYOND_RAD <= np.nanmin(angles) and np.nanmax(angles) <= high + BEYOND_RAD
+        for link in case.stand.mechanism.links
+        for low, high in [link.range_rad]
+        for angles in [log.columns[f"pos.{link.name}"]]
     )
 
 
