@@ -130,6 +130,18 @@ def _slow(params, state, x, dt):
     return state, x.replace(qd=params["slow_vel"])
 
 
+def _sag(params, state, x, dt):
+    """Divides the torque by what all joints ask for, where the others' is measured.
+
+    Of the others' demands d the measured torques are V d, so V = 1 / (1 + s (τ + Σ d))
+    becomes (1 − s Σ V d) / (1 + s τ).
+    """
+    sag = params["sag_per_nm"]
+    own = 1.0 / (1.0 + sag * jnp.abs(x.torque))
+    left = jnp.maximum(1.0 - sag * x.around.others_nm, 0.0) * own
+    return state, x.replace(torque=left * x.torque, follows=left * own * x.follows)
+
+
 def _enter(params, state, x, dt):
     """Remembers the servo's torque and lets the measured one enter the gears."""
     mixed = x.torque + params["measured"] * (params["effort"] - x.torque)
@@ -160,6 +172,8 @@ KINDS = {
 
 _RIGID = {n: kind for n, kind in KINDS.items() if n not in link.EFFECTS}
 _RIGID[SLOPE.name] = SLOPE
+_SAG = CATALOGUE["supply_sag"]
+_RIGID[_SAG.name] = dataclasses.replace(_SAG, acts={Stage.TORQUE: _sag})
 
 
 @partial(jax.jit, static_argnames=("dt", "names"))
