@@ -120,6 +120,8 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
     logged = np.array([not np.any(np.isnan(e)) for e in efforts])
     slow = [smoothed(p.vel[:, j], BAND_STEPS) for p in pieces]
     nm = [np.nan_to_num(scale * p.effort) for p in pieces]
+    # Of noise about zero the size is not zero: joints at rest would weigh on a supply.
+    calm = [np.stack([smoothed(x, BAND_STEPS) for x in e.T], 1) for e in nm]
     joints = logs[0].header.joints
     beside = neighbours(mechanism.model, joints, j)
     pulls = {
@@ -153,7 +155,7 @@ def _track(mechanism, logs, pieces, bodies, j, step_s) -> JointTrack:
         payload_moment=stack([b.payload_moment[:, j] for b in bodies]),
         payload_shift=stack([b.payload_shift[:, j] for b in bodies]),
         payload_inertia=stack([b.payload_inertia[:, j] for b in bodies]),
-        others_nm=stack([np.abs(e).sum(1) - np.abs(e[:, j]) for e in nm]),
+        others_nm=stack([np.abs(e).sum(1) - np.abs(e[:, j]) for e in calm]),
         other_q=pulls[other][0],
         other_nm=pulls[other][1],
         gravity=np.stack([b.gravity for b in bodies]),
