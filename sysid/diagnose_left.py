@@ -16,8 +16,9 @@ repeat than in the next is no news to the mechanics; the controller does not sti
 import numpy as np
 
 from envs.hand.effects.catalogue import CATALOGUE
+from sysid.diagnose_model import gain_nat
 from sysid.diagnose_problem import CHANNELS, Problem
-from sysid.diagnose_search import BELIEVED, EXCESS, Search
+from sysid.diagnose_search import ALIKE, BELIEVED, EXCESS, Search
 from sysid.diagnose_space import Slot
 
 LEFT = 0.2
@@ -65,15 +66,18 @@ def _is_size(slot: Slot) -> bool:
 
 
 def _bent(found: Search) -> list[str]:
-    """Finds figures that the causes need elsewhere."""
+    """Finds figures that the causes need elsewhere.
+
+    What the equation of a large effect leaves may bend one that belongs to no effect.
+    """
     slots, best = found.problem.space.slots, found.best
-    texts = []
+    texts, least = [], ALIKE * gain_nat(found.base, best, found.samples)
     for i in best.fit.free if best.effects else ():
         slot = slots[i]
         if slot.effect in best.effects or not np.isfinite(slot.tight):
             continue
         away = abs(best.fit.theta[i] - slot.base) / slot.tight
-        if away > BELIEVED:
+        if away > BELIEVED and (slot.effect or 0.5 * away**2 > least):
             name = f"{slot.effect}.{slot.name}".lstrip(".")
             texts.append(f"{name} lies {away:.0f} deviations from its figure")
     return texts

@@ -61,6 +61,16 @@ def error_nat(worse: Model, better: Model, samples: int) -> float:
     return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
 
 
+def bent(problem: Problem, model: Model, effect: str) -> float:
+    """Returns how far an effect's figures lie from where they are [deviations]."""
+    away = [
+        abs(model.fit.theta[i] - slot.base) / slot.tight
+        for i, slot in enumerate(problem.space.slots)
+        if slot.effect == effect and 0.0 < slot.tight < np.inf
+    ]
+    return max(away, default=0.0)
+
+
 def fit_models(
     problem: Problem,
     sets: Sequence[tuple[str, ...]],

@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnose_link import EFFECTS as LINKED
-from sysid.diagnose_model import Model, error_nat, fit_models, gain_nat
+from sysid.diagnose_model import Model, bent, error_nat, fit_models, gain_nat
 from sysid.diagnose_neighbour import coupled
-from sysid.diagnose_problem import Problem
+from sysid.diagnose_problem import CHANNELS, Problem
 from sysid.diagnose_starts import starts_of
 
 MOST = 3
@@ -150,8 +150,7 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
     gain = gain_nat(smaller, larger, samples)
     added = [e for e in larger.effects if e not in smaller.effects]
     # What an equation leaves of a large effect is not another effect.
-    k = _strongest(problem, smaller, larger)
-    least = ALIKE * 0.5 * (_parts(problem, base) - _parts(problem, smaller))[k]
+    least = ALIKE * _told(problem, smaller, larger, base)
     if all(problem.space.figured(e) for e in added):
         if any(bent(problem, smaller, e) > BELIEVED for e in added):
             # That the figure straightens is no matter of noise or of other effects.
@@ -159,16 +158,6 @@ def _worth(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool
         return gain > max(FIGURE_THRESHOLD, least)
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     return gain > max(threshold, least) and _shares(problem, smaller, larger, base)
-
-
-def bent(problem: Problem, model: Model, effect: str) -> float:
-    """Returns how far an effect's figures lie from where they are [deviations]."""
-    away = [
-        abs(model.fit.theta[i] - slot.base) / slot.tight
-        for i, slot in enumerate(problem.space.slots)
-        if slot.effect == effect and 0.0 < slot.tight < np.inf
-    ]
-    return max(away, default=0.0)
 
 
 def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> bool:
@@ -186,6 +175,16 @@ def _shares(problem: Problem, smaller: Model, larger: Model, base: Model) -> boo
 def _strongest(problem: Problem, smaller: Model, larger: Model) -> int:
     """Returns the part in which most of the error goes."""
     return int(np.argmax(_parts(problem, smaller) - _parts(problem, larger)))
+
+
+def _told(problem: Problem, smaller: Model, larger: Model, base: Model) -> float:
+    """Returns what a smaller model gains [nat] where a larger one gains most.
+
+    What figures take up by bending may come from either residual.
+    """
+    gained = _parts(problem, base) - _parts(problem, smaller)
+    k = _strongest(problem, smaller, larger)
+    return 0.5 * float(gained.sum() if k == len(CHANNELS) else gained[k])
 
 
 def _parts(problem: Problem, model: Model) -> Float[np.ndarray, "3"]:

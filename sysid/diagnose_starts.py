@@ -7,7 +7,7 @@ from jaxtyping import Float
 from scipy.signal import lfilter
 
 from sysid.diagnose_forced import EVERY, TAPS
-from sysid.diagnose_model import Model
+from sysid.diagnose_model import Model, bent
 from sysid.diagnose_problem import LANES, Problem
 
 COMB = (0.02, 0.002)
@@ -15,6 +15,9 @@ COMB = (0.02, 0.002)
 
 MOST_TEETH = 6e7
 """Largest number of grids that are tried, times that of the targets."""
+
+GONE = 2.0
+"""Prior deviations by which a figure has gone far."""
 
 TEETH = 16
 """Number of steps of a grid whose starts are tried in the whole chain."""
@@ -25,9 +28,12 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
 
     A start counts by the error that is left when the nuisances follow it linearly. One
     that changes nothing, a limit that the record does not reach, comes last: from there
-    no slope leads anywhere.
+    no slope leads anywhere. A figure that has already gone far goes on from there.
     """
     result: dict[str, list] = {name: [] for name in names}
+    for name in names:
+        if bent(problem, model, name) > GONE:
+            result[name].append(model.fit.theta)
     fitted, nominal = model.fit.theta, problem.space.base.copy()
     kept = [i for e in model.effects for i in problem.space.of(e)]
     nominal[kept] = fitted[kept]

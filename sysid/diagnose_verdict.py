@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
@@ -250,16 +251,28 @@ def blind_effects(found: Search) -> list[str]:
                 thetas.append(theta)
                 owners.append(name)
     rs = problem.residual(np.stack(thetas)) - model.fit.residual
-    deviation = space.deviations(model.effects)[model.fit.free]
-    j = np.concatenate([model.fit.jacobian, np.diag(1.0 / deviation)])
-    q, _ = np.linalg.qr(j)
-    full = np.concatenate([rs, np.zeros((len(rs), len(deviation)))], 1)
-    seen = np.sum(full**2, 1) - np.sum((full @ q) ** 2, 1)
     scale = max(1.0, model.score / max(found.samples, 1))
     best = {name: 0.0 for name in names}
-    for name, value in zip(owners, seen, strict=True):
-        best[name] = max(best[name], float(value) / scale)
+    for name, r in zip(owners, rs, strict=True):
+        best[name] = max(best[name], _lonely(found, r, space.of(name)) / scale)
     return [name for name in names if best[name] < 2.0 * SEEN]
+
+
+def _lonely(found: Search, r: Float[np.ndarray, " r"], own: list[int]) -> float:
+    """Returns the squared change that no other figure takes back.
+
+    Args:
+        found: a search.
+        r: change of the residual.
+        own: coordinates of what changed.
+    """
+    fit, effects = found.best.fit, found.best.effects
+    others = ~np.isin(fit.free, own)
+    deviation = found.problem.space.deviations(effects)[fit.free[others]]
+    j = np.concatenate([fit.jacobian[:, others], np.diag(1.0 / deviation)])
+    q, _ = np.linalg.qr(j)
+    taken = q.T @ np.concatenate([r, np.zeros(len(deviation))])
+    return float(r @ r - taken @ taken)
 
 
 def _shapes(effect: str) -> set[str]:

@@ -167,7 +167,7 @@ def _shown(task: Task, case: Case) -> bool:
 
 def main() -> None:
     """Runs the battery from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--seed", type=int, default=None, help="default: drawn")
     parser.add_argument("--records", type=int, default=FULL, help=f"default {FULL}")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)

@@ -119,16 +119,19 @@ def test_jumps_that_do_not_repeat_are_not_noise(searched):
 
 def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     """The first of two causes was chosen when it had to stand for both."""
-    problem, base = searched.problem, searched.base
+    problem = searched.problem
+    base = replace(searched.base, errors=np.array([4.0, 4.0]))
 
     def scored(effects, gained):
         score = base.score - 2.0 * gained
         fit = replace(base.fit, cost=base.fit.cost - 2.0 * gained)
-        return replace(base, effects=effects, score=score, fit=fit)
+        errors = base.errors - gained / 200.0
+        return replace(base, effects=effects, score=score, fit=fit, errors=errors)
 
     first = scored(("payload_com", "deadband"), 300.0)
     right = scored(("deadband", "joint_coupling"), 340.0)
-    without = {"payload_com": scored(("deadband",), 100.0), "deadband": base}
+    alone = scored(("deadband",), 100.0)
+    without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
     offered = {first.effects: {"payload_com": [right], "deadband": []}}
     monkeypatch.setattr(
         diagnose_search,
@@ -140,3 +143,5 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     close = scored(right.effects, 302.0)
     offered[first.effects]["payload_com"] = [close]
     assert diagnose_search._exchanged(problem, first, base)[0] is first
+    without["deadband"] = scored(("payload_com",), 298.0)
+    assert diagnose_search._exchanged(problem, first, base)[0] is without["deadband"]
