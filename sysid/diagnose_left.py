@@ -29,6 +29,10 @@ reversals, a slack cable behind shifted loads 0.15 to 0.9."""
 FAR = 8.0
 """Deviations of the noise that no sample of it reaches."""
 
+LOUD = 3.0
+"""Deviations of the noise as it was before a cause was found, that a jump exceeds too:
+beside a cause that takes nearly all away, steps of an encoder are jumps."""
+
 
 def left_over(found: Search) -> list[str]:
     """Tells what speaks for something that no named effect explains."""
@@ -103,4 +107,5 @@ def _jumps(problem: Problem, raw: np.ndarray, k: int) -> bool:
     if not valid.any():
         return False
     x = np.abs(series[valid])
-    return bool(np.max(x) > FAR * np.median(x) / 0.6745)
+    least = max(FAR * np.median(x) / 0.6745, LOUD * problem.noise[k].deviation)
+    return bool(np.max(x) > least)
