@@ -13,11 +13,12 @@ from hidden.stands import make_stand
 from sysid import diagnose_search
 from sysid.data import make_log
 from sysid.diagnose import problem_of
-from sysid.diagnose_left import left_over
+from sysid.diagnose_left import _jumps, left_over
 from sysid.diagnose_model import fit_models
 from sysid.diagnose_neighbour import beside, coupled
 from sysid.diagnose_records import grid_step_s
 from sysid.diagnose_search import Search, settled
+from sysid.diagnose_starts import starts_of
 from sysid.diagnose_tracks import all_tracks
 
 
@@ -115,6 +116,29 @@ def test_jumps_that_do_not_repeat_are_not_noise(searched):
     model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
     left = left_over(replace(searched, problem=shaken, best=model))
     assert any("controller residual has jumps" in text for text in left)
+
+
+def test_a_figure_that_has_gone_far_goes_on_from_there(searched):
+    problem, base = searched.problem, searched.base
+    (i,) = problem.space.of("damping")
+    theta = base.fit.theta.copy()
+    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
+    gone = replace(base, fit=replace(base.fit, theta=theta))
+    far = starts_of(problem, gone, ["damping"])["damping"]
+    assert any(start is theta for start in far)
+    near = starts_of(problem, base, ["damping"])["damping"]
+    assert not any(start is base.fit.theta for start in near)
+
+
+def test_steps_of_an_encoder_are_no_jumps(searched):
+    """Beside a cause that leaves next to nothing, a least step lies far out."""
+    problem = searched.problem
+    quiet = np.zeros((2, *problem.valid.shape[1:]))
+    at = np.argwhere(problem.valid[0])[100]
+    quiet[0][tuple(at)] = problem.noise[0].deviation
+    assert not _jumps(problem, quiet[0], 0)
+    quiet[0][tuple(at)] *= 20.0
+    assert _jumps(problem, quiet[0], 0)
 
 
 def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
