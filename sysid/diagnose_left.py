@@ -18,8 +18,9 @@ import numpy as np
 from envs.hand.effects.catalogue import CATALOGUE
 from sysid.diagnose_model import gain_nat
 from sysid.diagnose_problem import CHANNELS, Problem
-from sysid.diagnose_search import ALIKE, BELIEVED, EXCESS, Search
+from sysid.diagnose_search import EXCESS, Search
 from sysid.diagnose_space import Slot
+from sysid.diagnose_worth import ALIKE, BELIEVED
 
 LEFT = 0.2
 """Share of the removable squared error that a whole explanation may leave: its equation

@@ -13,9 +13,11 @@ from sysid.diagnose_left import left_over
 from sysid.diagnose_model import Model, gain_nat
 from sysid.diagnose_neighbour import EFFECT as PULLED
 from sysid.diagnose_problem import CHANNELS
-from sysid.diagnose_search import NEARLY, NESTED, THRESHOLD, Search
+from sysid.diagnose_search import Search
 from sysid.diagnose_space import Slot
+from sysid.diagnose_stage import NEARLY, NESTED
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
+from sysid.diagnose_worth import THRESHOLD
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
 from sysid.mechanism import Mechanism
 

@@ -10,7 +10,7 @@ from hidden.recording import standard
 from hidden.sampling import Noise, record
 from hidden.stands import make_stand
 
-from sysid import diagnose_search
+from sysid import diagnose_exchange
 from sysid.data import make_log
 from sysid.diagnose import problem_of
 from sysid.diagnose_left import _jumps, left_over
@@ -158,14 +158,14 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
     offered = {first.effects: {"payload_com": [right], "deadband": []}}
     monkeypatch.setattr(
-        diagnose_search,
-        "_swapped",
+        diagnose_exchange,
+        "swapped",
         lambda problem, best, base: (offered.get(best.effects, {}), without),
     )
-    monkeypatch.setattr(diagnose_search, "_pruned", lambda problem, model, base: model)
-    assert diagnose_search._exchanged(problem, first, base)[0] is right
+    monkeypatch.setattr(diagnose_exchange, "pruned", lambda problem, model, base: model)
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is right
     close = scored(right.effects, 302.0)
     offered[first.effects]["payload_com"] = [close]
-    assert diagnose_search._exchanged(problem, first, base)[0] is first
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is first
     without["deadband"] = scored(("payload_com",), 298.0)
-    assert diagnose_search._exchanged(problem, first, base)[0] is without["deadband"]
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is without["deadband"]

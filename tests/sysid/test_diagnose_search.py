@@ -6,8 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid import diagnose_search as search
 from sysid.diagnose_model import Model, gain_nat
+from sysid.diagnose_search import _fullest
+from sysid.diagnose_stage import _fits_in
+from sysid.diagnose_worth import told
 from sysid.fit import Fit
 
 PROBLEM: Any = SimpleNamespace(counts=lambda: np.ones(2000, bool))
@@ -36,20 +38,20 @@ def test_what_a_cause_must_add_is_measured_in_its_own_residual():
     """35,000 nat in the controller's residual ask for nothing in the mechanics'."""
     base, limited = model(0.0, (71.0, 2.0)), model(0.0, (1.0, 2.0))
     friction = model(0.0, (1.0, 1.5))
-    assert search._told(PROBLEM, limited, friction, base) == 0.0
+    assert told(PROBLEM, limited, friction, base) == 0.0
     other = model(0.0, (0.5, 2.0))
-    assert search._told(PROBLEM, limited, other, base) == pytest.approx(35_000.0)
+    assert told(PROBLEM, limited, other, base) == pytest.approx(35_000.0)
 
 
 def test_one_thing_moves_the_link():
-    assert not search._fits_in("compliance", ("deadband", "backlash"))
-    assert not search._fits_in("backlash", ("compliance",))
-    assert not search._fits_in("deadband", ("deadband",))
-    assert search._fits_in("deadband", ("backlash",))
+    assert not _fits_in("compliance", ("deadband", "backlash"))
+    assert not _fits_in("backlash", ("compliance",))
+    assert not _fits_in("deadband", ("deadband",))
+    assert _fits_in("deadband", ("backlash",))
 
 
 def test_one_that_explains_what_the_first_leaves_goes_before_it():
     first, full = model(0.0, (4.0, 1.0)), model(0.0, (1.2, 1.0))
-    assert search._fullest([first, full]) is full
-    assert search._fullest([first, model(0.0, (3.0, 1.0))]) is first
-    assert search._fullest([model(0.0, (1.3, 1.0)), full]).errors[0] == 1.3
+    assert _fullest([first, full]) is full
+    assert _fullest([first, model(0.0, (3.0, 1.0))]) is first
+    assert _fullest([model(0.0, (1.3, 1.0)), full]).errors[0] == 1.3

@@ -17,7 +17,8 @@ from hidden.cases import draw_case
 
 from sysid.diagnose import problem_of
 from sysid.diagnose_model import fit_models, gain_nat
-from sysid.diagnose_search import extended, settled
+from sysid.diagnose_search import settled
+from sysid.diagnose_stage import extended
 from sysid.diagnose_tracks import all_tracks
 
 
