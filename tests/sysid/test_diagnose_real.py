@@ -117,7 +117,7 @@ def test_xl330_gain_is_half_of_the_manual():
 @real
 @pytest.mark.slow
 def test_xl330_load_friction_and_limit():
-    """Every gain is predicted from the others: 92 to 48 mrad in closed loop."""
+    """Every gain is predicted from the others: 102 to 48 mrad in closed loop."""
     free = {
         "viscous_friction": {"damping_nms": Figure(0.02, 0.1, free=True)},
         "coulomb_friction": {"torque_nm": Figure(0.01, 0.1, free=True)},
