@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import yaml
-from effects_table import table
+from support.effects_table import table
 
 from envs.config import from_dict, to_dict
 from envs.hand.effects.base import Stage
@@ -14,7 +14,7 @@ TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
 
 
 def test_the_table_is_that_of_the_catalogue():
-    """`python tests/effects_table.py` prints the table as it should be."""
+    """`python tests/support/effects_table.py` prints the table as it should be."""
     assert TEXT.endswith(table())
     assert not TEXT.endswith(table().replace("backlash", "backlsh"))
 

@@ -4,9 +4,8 @@ import getpass
 import platform
 import socket
 
-import cli_setup
 import pytest
-import train_setup
+from support import cli_setup, train_setup
 
 SECRET = "zq7x"
 """Stands in the name of user, machine, home and place, and nowhere else."""

@@ -9,9 +9,9 @@ import shutil
 import time
 from pathlib import Path
 
-import cli_setup
 import numpy as np
 import pytest
+from support import cli_setup
 
 from envs.config import dump_yaml, load_yaml, to_dict
 from envs.crawl import CrawlConfig

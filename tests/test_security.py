@@ -10,8 +10,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import train_setup
-from cli_setup import make_bundle, make_setup
+from support import train_setup
+from support.cli_setup import make_bundle, make_setup
 
 from envs.config import load_yaml
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
-from keyboard_rig import Rig
+from support.keyboard_rig import Rig
 
 from envs.hand.figures import figures
 from envs.hand.spec import HAND_NQ

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from properties import counts, holds
+from support.properties import counts, holds
 
 from envs.config import dump_yaml, from_dict, load_yaml, override, to_dict
 from envs.crawl import CrawlConfig, CrawlEnv

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import mujoco
 import numpy as np
 from hypothesis import strategies as st
-from properties import counts, holds
+from support.properties import counts, holds
 
 from envs.rotations import about_z, conjugate, from_vector, multiply, rotate, unrotate
 from envs.signals import gravity, tilt

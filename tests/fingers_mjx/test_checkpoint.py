@@ -14,11 +14,11 @@ import sys
 from collections import namedtuple
 from pathlib import Path
 
-import checkpoint_child
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import checkpoint_child
 
 from envs.errors import InputError
 from fingers_mjx import checkpoint, rundir_files

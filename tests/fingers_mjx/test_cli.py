@@ -5,7 +5,7 @@ import json
 import imageio_ffmpeg
 import numpy as np
 import pytest
-from cli_setup import make_run, make_setup
+from support.cli_setup import make_run, make_setup
 
 from envs.hand.hand_file import DEFAULT_HAND_FILE
 from envs.hand.stance import load_stance

@@ -6,7 +6,7 @@ import sys
 
 import onnx
 import pytest
-from cli_setup import contents, make_bundle, make_run, make_setup
+from support.cli_setup import contents, make_bundle, make_run, make_setup
 
 from fingers_deploy.manifest import Interface
 from fingers_mjx.cli import main

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from cli_setup import TRAIN, make_bundle, make_setup
+from support.cli_setup import TRAIN, make_bundle, make_setup
 
 from fingers_mjx.cli import main
 from fingers_mjx.cli_progress import counting

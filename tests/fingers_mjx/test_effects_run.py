@@ -6,7 +6,7 @@ import effects_hand as rig
 import jax
 import numpy as np
 import pytest
-from cli_setup import make_bundle, make_setup
+from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.chained_drive import ChainState
 from fingers_deploy import load_bundle

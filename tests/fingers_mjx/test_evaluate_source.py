@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import jax
 import numpy as np
 import pytest
-from cli_setup import make_setup
+from support.cli_setup import make_setup
 
 from envs.commands import sample_command
 from envs.errors import InputError

@@ -2,7 +2,7 @@
 
 import mujoco
 import pytest
-from cli_setup import contents
+from support.cli_setup import contents
 
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from outside_task import CROUCH, register_crouch
+from support.outside_task import CROUCH, register_crouch
 
 from envs import registry
 from fingers_mjx.cli import main

@@ -6,7 +6,7 @@ import jax
 import mujoco
 import numpy as np
 import pytest
-from cli_setup import make_bundle, make_setup, random_weights
+from support.cli_setup import make_bundle, make_setup, random_weights
 
 from envs.commands import CommandConfig
 from fingers_deploy import BundleError, load_bundle

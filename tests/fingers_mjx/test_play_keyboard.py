@@ -8,8 +8,8 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-from cli_setup import TRAIN, make_bundle, random_weights
-from keyboard_rig import Rig
+from support.cli_setup import TRAIN, make_bundle, random_weights
+from support.keyboard_rig import Rig
 
 from envs.errors import InputError
 from envs.keyboard_fingertip import JOINTS

@@ -5,7 +5,7 @@ import dataclasses
 import jax
 import numpy as np
 import pytest
-from cli_setup import TRAIN, make_bundle, random_weights
+from support.cli_setup import TRAIN, make_bundle, random_weights
 
 from fingers_deploy import load_bundle
 from fingers_deploy.tracking import ObjectTracker

@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import numpy as np
 import pytest
-from cli_setup import TRAIN, make_bundle, make_setup, random_weights
+from support.cli_setup import TRAIN, make_bundle, make_setup, random_weights
 
 from envs.errors import InputError
 from envs.recovery_falls import Falls

@@ -12,7 +12,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from brax.training.agents.ppo import networks
-from probe_envs import Fault, probe
+from support.probe_envs import Fault, probe
 
 from fingers_mjx.ppo import compile_iterations, make_iteration
 from fingers_mjx.ppo_brax import make_networks

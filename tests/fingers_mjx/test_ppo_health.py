@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from probe_envs import probe
+from support.probe_envs import probe
 
 from fingers_mjx.ppo_brax import learning_rate
 from fingers_mjx.ppo_config import PpoConfig

@@ -9,7 +9,7 @@ from itertools import pairwise
 import jax
 import numpy as np
 import pytest
-from cli_setup import make_bundle, make_setup, random_weights
+from support.cli_setup import make_bundle, make_setup, random_weights
 
 from envs.commands import CommandConfig
 from envs.randomize import no_randomization

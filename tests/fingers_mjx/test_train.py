@@ -14,9 +14,9 @@ from types import SimpleNamespace
 import jax
 import numpy as np
 import pytest
-import train_setup
-from probe_envs import Fault, probe
-from train_setup import assert_same_end, curve, leaves, make_env, run
+from support import train_setup
+from support.probe_envs import Fault, probe
+from support.train_setup import assert_same_end, curve, leaves, make_env, run
 
 from envs.errors import InputError
 from envs.hand_settings import HandSettings

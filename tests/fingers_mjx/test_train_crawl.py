@@ -8,7 +8,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from train_setup import assert_same_end, leaves
+from support.train_setup import assert_same_end, leaves
 
 from envs.batch import BatchEnv
 from envs.errors import InputError

@@ -14,8 +14,8 @@ import time
 from pathlib import Path
 
 import pytest
-import train_setup
-from train_setup import assert_same_end, curve, leaves, run
+from support import train_setup
+from support.train_setup import assert_same_end, curve, leaves, run
 
 from fingers_mjx import checkpoint
 from fingers_mjx.train_errors import Interrupted

@@ -7,7 +7,7 @@ from typing import Any, cast
 import effects_hand as rig
 import numpy as np
 import pytest
-from cli_setup import make_bundle, make_setup
+from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli import main

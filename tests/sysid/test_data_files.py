@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from sysid_logs import small_log
+from support.sysid_logs import small_log
 
 from envs.errors import InputError
 from sysid.data import MeasuredLog

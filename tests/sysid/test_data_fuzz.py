@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from log_damage import HOSTILE, csv_damage, flipped, torn
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
-from sysid_logs import small_log
+from support.log_damage import HOSTILE, csv_damage, flipped, torn
+from support.sysid_logs import small_log
 
 from fingers_mjx.cli import main
 from sysid.data_read import read_log, write_log

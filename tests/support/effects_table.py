@@ -1,6 +1,6 @@
 """The table of `docs/effects.md`, from the catalogue.
 
-`python tests/effects_table.py` prints it.
+`python tests/support/effects_table.py` prints it.
 """
 
 import math

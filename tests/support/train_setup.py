@@ -12,7 +12,7 @@ import sys
 import time
 from pathlib import Path
 
-from probe_envs import probe
+from support.probe_envs import probe
 
 from fingers_mjx import checkpoint
 from fingers_mjx.ppo_config import PpoConfig, TrainConfig
