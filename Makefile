@@ -39,7 +39,7 @@ demo: sync ## The walking hand: evaluate, play, train, export, one report
 	$(RUN) fingers demo
 
 battery: sync ## Hide effects, ask the diagnosis, count how often it is right (hours)
-	PYTHONPATH=.:tests $(RUN) python tests/sysid/battery.py --out build/battery
+	$(RUN) python -m benchmarks.diagnosis.battery --out build/battery
 
 bench: sync ## Speed of physics, environment and PPO on this machine
 	$(RUN) python benchmarks/throughput.py

@@ -5,11 +5,11 @@ import json
 
 import numpy as np
 import pytest
-from hidden.pull import SPEED_M_S, pull
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.stands import make_stand, slightly_wrong
 
+from benchmarks.diagnosis.hidden.pull import SPEED_M_S, pull
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from sysid.calibrate import calibrate, calibrated_hand, weighed_mean

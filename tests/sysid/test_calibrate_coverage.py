@@ -5,10 +5,10 @@ import secrets
 
 import numpy as np
 import pytest
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.stands import make_stand, slightly_wrong
 
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.calibrate_joint import fit_joint
 from sysid.mechanism import hand_mechanism
 

@@ -10,14 +10,14 @@ import re
 
 import numpy as np
 import pytest
-from hidden.believed import believed
-from hidden.cases import draw_case
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.sizes import SCALES
-from hidden.stands import make_stand
-from hidden.truth import OUTSIDE, Mechanism
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import draw_case
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.sizes import SCALES
+from benchmarks.diagnosis.hidden.stands import make_stand
+from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from envs.hand.hand_file import load_hand_file
 from fingers_mjx.cli import main
 from sysid.data import MeasuredLog, make_log

@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden.believed import believed
-from hidden.cases import draw_case
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.stands import make_stand
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import draw_case
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand
 from sysid import diagnose_exchange
 from sysid.data import make_log
 from sysid.diagnose import problem_of

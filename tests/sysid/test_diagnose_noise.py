@@ -4,12 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hidden.believed import believed
-from hidden.cases import _Finder, draw_case
-from hidden.recording import standard
-from hidden.sampling import Noise
-from hidden.stands import make_stand, slightly_wrong
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import _Finder, draw_case
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise
+from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnose import problem_of
 from sysid.diagnose_forced import BAND_STEPS, EVERY
 from sysid.diagnose_grid import SMOOTH_STEPS, smoothed
@@ -72,7 +72,7 @@ def test_a_limit_that_acts_is_observable():
 @pytest.mark.parametrize(("settled_s", "visible"), [(0.5, False), (-1.0, True)])
 def test_how_a_joint_begins_makes_nothing_visible(monkeypatch, settled_s, visible):
     """A light joint does not feel where its encoder's zero is."""
-    monkeypatch.setattr("hidden.cases.SETTLED_S", settled_s)
+    monkeypatch.setattr("benchmarks.diagnosis.hidden.cases.SETTLED_S", settled_s)
     rng = np.random.default_rng(4)
     stand = make_stand("joint", rng)
     once = standard(rng, stand.middle, stand.reach, 200.0, 4.0)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hidden.believed import believed
-from hidden.cases import draw_case
 from scipy.signal import lfilter
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import draw_case
 from envs.errors import InputError
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.quiet_mujoco import mujoco

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis.public_logs.emps import load_emps
+from benchmarks.diagnosis.public_logs.sts3215 import RAD_PER_COUNT, load_sts3215
+from benchmarks.diagnosis.public_logs.xl330 import load_xl330
 from envs.quiet_mujoco import mujoco
 from sysid.diagnose import examine
 from sysid.mechanism import Figure, JointDrive, model_mechanism
-from sysid.sources.emps import load_emps
-from sysid.sources.sts3215 import RAD_PER_COUNT, load_sts3215
-from sysid.sources.xl330 import load_xl330
 
 REAL = os.environ.get("FINGERS_REAL_DATA", "")
 real = pytest.mark.skipif(not REAL, reason="FINGERS_REAL_DATA names no folder")

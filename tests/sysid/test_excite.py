@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
-from hidden.believed import believed
-from hidden.stands import make_stand
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.stands import make_stand
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
 from sysid.excite import Limits, joint_groups, make_plan, rest_posture

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
-from hidden.recording import Recording
-from hidden.simulate import Motion, simulate
-from hidden.truth import Mechanism
 
+from benchmarks.diagnosis.hidden.recording import Recording
+from benchmarks.diagnosis.hidden.simulate import Motion, simulate
+from benchmarks.diagnosis.hidden.truth import Mechanism
 from sysid.data import MeasuredLog, make_log
 
 

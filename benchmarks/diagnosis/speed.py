@@ -1,6 +1,6 @@
 """Times a diagnosis: one joint alone, and all twenty joints of a hand.
 
-    PYTHONPATH=.:tests python tests/sysid/speed.py --kinds pendulum hand
+    python -m benchmarks.diagnosis.speed --kinds pendulum hand
 
 Records come from the other simulator, with backlash in one joint: 30 s at 500 Hz of the
 pendulum, 60 s at 200 Hz of the hand. Each is diagnosed twice; the first time also
@@ -11,11 +11,11 @@ import argparse
 import time
 
 import numpy as np
-from hidden.believed import believed
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.stands import make_stand, slightly_wrong
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnose import diagnose
 
 RECORDS = {"pendulum": (500.0, 10.0), "hand": (200.0, 20.0)}

@@ -2,11 +2,10 @@
 
 from dataclasses import replace
 
-from hidden.cases import Case
-from hidden.plant import ROTOR_SHARE, build
-from hidden.stands import TOLERANCES, Stand
-from hidden.truth import Joint
-
+from benchmarks.diagnosis.hidden.cases import Case
+from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
+from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
+from benchmarks.diagnosis.hidden.truth import Joint
 from sysid.mechanism import Figure, JointDrive, Mechanism, model_mechanism
 
 

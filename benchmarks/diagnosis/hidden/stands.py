@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from hidden.truth import Joint, Link, Mechanism
 
+from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 

@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from hidden.truth import Joint, Link, Mechanism
+
+from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 
 STEP_S = 0.0005
 GRAVITY = 9.81

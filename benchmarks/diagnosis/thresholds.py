@@ -1,6 +1,6 @@
 """From which gain on is an effect more than chance? Effect-free records tell.
 
-    PYTHONPATH=.:tests python tests/sysid/thresholds.py --seed 1 --records 100
+    python -m benchmarks.diagnosis.thresholds --seed 1 --records 100
 
 Every effect is added to the simulation of effect-free records, as a search does first.
 Printed are the largest gains of a record, apart for figures that the simulation has and
@@ -12,9 +12,9 @@ import json
 from pathlib import Path
 
 import numpy as np
-from hidden.believed import believed
-from hidden.cases import draw_case
 
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import draw_case
 from sysid.diagnose import problem_of
 from sysid.diagnose_model import fit_models, gain_nat
 from sysid.diagnose_search import settled

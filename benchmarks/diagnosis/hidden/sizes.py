@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from hidden.truth import Mechanism
+
+from benchmarks.diagnosis.hidden.truth import Mechanism
 
 Apply = Callable[[Mechanism, int, float, np.random.Generator], Mechanism]
 

@@ -4,9 +4,10 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
-from hidden.joint_drive import JointDrive
-from hidden.plant import STEP_S, build
-from hidden.truth import Mechanism
+
+from benchmarks.diagnosis.hidden.joint_drive import JointDrive
+from benchmarks.diagnosis.hidden.plant import STEP_S, build
+from benchmarks.diagnosis.hidden.truth import Mechanism
 
 
 @dataclass(frozen=True)

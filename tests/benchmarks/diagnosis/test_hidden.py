@@ -8,13 +8,13 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 import pytest
-from hidden.cases import draw_case
-from hidden.joint_drive import JointDrive, _Bristle, _Jenkins
-from hidden.recording import Recording, standard
-from hidden.sampling import Noise, exact, record
-from hidden.simulate import simulate
-from hidden.truth import Joint, Link, Mechanism
 
+from benchmarks.diagnosis.hidden.cases import draw_case
+from benchmarks.diagnosis.hidden.joint_drive import JointDrive, _Bristle, _Jenkins
+from benchmarks.diagnosis.hidden.recording import Recording, standard
+from benchmarks.diagnosis.hidden.sampling import Noise, exact, record
+from benchmarks.diagnosis.hidden.simulate import simulate
+from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.effects.chain import chain_step
 

@@ -4,8 +4,9 @@ import math
 from bisect import bisect_right
 
 import numpy as np
-from hidden.truth import Joint
 from scipy.stats import gamma
+
+from benchmarks.diagnosis.hidden.truth import Joint
 
 PRESLIDING_RAD = 2e-4
 """How far dry friction gives before it slips."""

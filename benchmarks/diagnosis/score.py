@@ -1,6 +1,6 @@
 """What a battery of hidden cases says about a diagnosis, in the figures asked for.
 
-PYTHONPATH=.:tests python -m hidden.score ROWS.jsonl
+PYTHONPATH=.:tests python -m benchmarks.diagnosis.score ROWS.jsonl
 """
 
 import json
@@ -11,8 +11,9 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
 import numpy as np
-from hidden.truth import OUTSIDE
 from scipy.stats import beta
+
+from benchmarks.diagnosis.hidden.truth import OUTSIDE
 
 SAME_MOTION = (
     {"encoder_offset", "mount_tilt", "payload_com"},

@@ -1,6 +1,6 @@
 """Three parameters from one log: this project's fit and `mujoco.sysid`, in one run.
 
-    python benchmarks/identify.py --seeds 3
+    python -m benchmarks.diagnosis.identify --seeds 3
 
 A servo with a weight is simulated by C MuJoCo at 8 kHz with its gains and armature
 drawn at random, and recorded as a host would: 500 Hz, encoder steps, noise on angle and

@@ -4,7 +4,8 @@ import importlib.util
 from pathlib import Path
 
 import pytest
-from hidden.score import Row, confusion, figures, report, upper_bound
+
+from benchmarks.diagnosis.score import Row, confusion, figures, report, upper_bound
 
 SPEC = importlib.util.spec_from_file_location(
     "battery", Path(__file__).with_name("battery.py")

@@ -1,6 +1,6 @@
 """Hides effects, asks the diagnosis, and prints how often it was right.
 
-    python tests/sysid/battery.py --seed 7 --records 100 --workers 2 --out battery
+    python -m benchmarks.diagnosis.battery --seed 7 --records 100 --workers 2 --out battery
 
 Every case is drawn from the seed and its number, so one of them can be run again with
 `--only NUMBER`. Rows are written as they come; a second call with the same `--out` and
@@ -18,10 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from hidden.cases import RATIOS, Case, draw_case
-from hidden.score import Row, confusion, figures, report
-from hidden.sizes import SCALES
-from hidden.truth import OUTSIDE
+
+from benchmarks.diagnosis.hidden.cases import RATIOS, Case, draw_case
+from benchmarks.diagnosis.hidden.sizes import SCALES
+from benchmarks.diagnosis.hidden.truth import OUTSIDE
+from benchmarks.diagnosis.score import Row, confusion, figures, report
 
 CATALOGUE = tuple(name for name in SCALES if name not in OUTSIDE)
 SHARES = {
@@ -92,8 +93,7 @@ def _turns(rng, items: list):
 
 def run_task(task: Task) -> Row:
     """Draws the case and diagnoses it."""
-    from hidden.believed import believed, true_parameters
-
+    from benchmarks.diagnosis.hidden.believed import believed, true_parameters
     from envs.errors import InputError
     from sysid.diagnose import diagnose
 

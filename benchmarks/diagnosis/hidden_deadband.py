@@ -1,6 +1,6 @@
 """Records a finger whose servos have a deadband, in a simulator that shares no code.
 
-    PYTHONPATH=.:tests python tests/sysid/hidden_deadband.py --out deadband
+    python -m benchmarks.diagnosis.hidden_deadband --out deadband
 
 Writes `finger.parquet`, three rounds of the standard recording of a ring finger on a
 stand with noise and slightly wrong believed figures, and `real.yaml`, the hand of which
@@ -12,10 +12,10 @@ import dataclasses
 from pathlib import Path
 
 import numpy as np
-from hidden.recording import standard
-from hidden.sampling import Noise, record
-from hidden.stands import make_stand, slightly_wrong
 
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from envs.hand.hand_file import (
     EFFECTS,
     Effect,

@@ -9,12 +9,18 @@ import math
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from hidden.recording import Recording, standard
-from hidden.sampling import Noise, exact, record, ticks
-from hidden.sizes import SCALES
-from hidden.stands import TOLERANCES, Stand, changed, make_stand, slightly_wrong
-from hidden.truth import OUTSIDE, Mechanism
 
+from benchmarks.diagnosis.hidden.recording import Recording, standard
+from benchmarks.diagnosis.hidden.sampling import Noise, exact, record, ticks
+from benchmarks.diagnosis.hidden.sizes import SCALES
+from benchmarks.diagnosis.hidden.stands import (
+    TOLERANCES,
+    Stand,
+    changed,
+    make_stand,
+    slightly_wrong,
+)
+from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from sysid.data import MeasuredLog
 
 RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}

@@ -1,0 +1,1 @@
+"""What was measured, and how: speed, and how often a diagnosis is right."""

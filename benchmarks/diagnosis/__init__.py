@@ -1,0 +1,1 @@
+"""How often a diagnosis is right: hidden effects, public logs, the battery."""
