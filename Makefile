@@ -42,7 +42,7 @@ battery: sync ## Hide effects, ask the diagnosis, count how often it is right (h
 	$(RUN) python -m benchmarks.diagnosis.battery --out build/battery
 
 bench: sync ## Speed of physics, environment and PPO on this machine
-	$(RUN) python benchmarks/throughput.py
+	$(RUN) python -m benchmarks.speed.throughput
 
 build: sync ## Wheels, installed and tried in an environment of their own
 	rm -rf dist build/trial

@@ -1,7 +1,7 @@
 """Throughput of bare physics, environment and PPO of the same model in one run.
 
-    python benchmarks/throughput.py --backend cpu --against jax
-    python benchmarks/throughput.py --backend warp --num-envs 8192 --json warp.json
+    python -m benchmarks.speed.throughput --backend cpu --against jax
+    python -m benchmarks.speed.throughput --backend warp --num-envs 8192 --json warp.json
 
 Prints control steps per second of all worlds together (four physics steps each) and
 the ratio to bare physics, which is native batch stepping: `mujoco.batch.Batch` for cpu,

@@ -1,0 +1,1 @@
+"""Control steps per second, layer by layer."""
