@@ -4,7 +4,7 @@
     from then on  target = start + (stance − start)(3s² − 2s³),  s = (t − t₀)/T ≤ 1
     T = max(1.5 s, 1.5 max |stance − start| / (0.8 α/Δt))
 
-`fingers_deploy.behaviour.upright` and `fingers_deploy.behaviour.settle` run on the hand
+`fingers_robot.behaviour.upright` and `fingers_robot.behaviour.settle` run on the hand
 and know no JAX; here is the same for many worlds at once, and a test compares both.
 """
 

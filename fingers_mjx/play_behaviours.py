@@ -1,6 +1,6 @@
 """The shim's behaviours in the closed loop: recovery, detector, ramp, next policy.
 
-`fingers_deploy.behaviour.Policies` decides which policy runs and when a ramp moves the
+`fingers_robot.behaviour.Policies` decides which policy runs and when a ramp moves the
 targets, told by packets as the supervisor sends them; here it has the calls of a
 `PolicyController`.
 """
@@ -12,12 +12,12 @@ from jaxtyping import Float
 
 from envs.errors import InputError
 from fingers_deploy import Bundle, PolicyController
-from fingers_deploy.behaviour.command import DEADZONE, FixedCommand, Ranges
-from fingers_deploy.behaviour.policies import Policies
 from fingers_deploy.policy import Runtime
-from fingers_deploy.runtime.link import OBSERVATION, Answer, decode_answer
-from fingers_deploy.safety import PolicyFault
 from fingers_mjx.play_upright import orientation_of
+from fingers_robot.behaviour.command import DEADZONE, FixedCommand, Ranges
+from fingers_robot.behaviour.policies import Policies
+from fingers_robot.runtime.link import OBSERVATION, Answer, decode_answer
+from fingers_robot.safety import PolicyFault
 
 
 class Behaviours:

@@ -18,7 +18,12 @@ from envs.keyboard_requests import IDLE
 from envs.memory import Memory
 from envs.physics import PhysicsState
 from fingers_deploy import Bundle
-from fingers_deploy.behaviour.keys import (
+from fingers_deploy.fingertip import pressing_fingertip
+from fingers_deploy.policy import Runtime
+from fingers_mjx.evaluate_record import Trace
+from fingers_mjx.play import Played, Player, Schedule
+from fingers_mjx.sokoban import Board, move
+from fingers_robot.behaviour.keys import (
     ARROWS,
     KeyOutcome,
     KeyState,
@@ -26,11 +31,6 @@ from fingers_deploy.behaviour.keys import (
     begin_keys,
     keys_step,
 )
-from fingers_deploy.fingertip import pressing_fingertip
-from fingers_deploy.policy import Runtime
-from fingers_mjx.evaluate_record import Trace
-from fingers_mjx.play import Played, Player, Schedule
-from fingers_mjx.sokoban import Board, move
 
 TASK = "keyboard"
 

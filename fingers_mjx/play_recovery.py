@@ -10,10 +10,10 @@ from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.memory import Memory
 from fingers_deploy import Bundle
-from fingers_deploy.behaviour.policies import RECOVERY
 from fingers_deploy.policy import Runtime
 from fingers_mjx.play import Played, Player
 from fingers_mjx.play_behaviours import Behaviours
+from fingers_robot.behaviour.policies import RECOVERY
 
 
 class RecoveryPlayer(Player):

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import numpy as np
 
-from fingers_deploy.behaviour.command import FixedCommand
-from fingers_deploy.behaviour.policies import Policies
 from fingers_deploy.bundle import Bundle
 from fingers_deploy.controller import PolicyController
-from fingers_deploy.reading import DriverInfo, Health, ImuReading, Reading
-from fingers_deploy.runtime.core import Core
-from fingers_deploy.runtime.link import Answer, decode_answer
-from fingers_deploy.runtime.ticker import Tick
-from fingers_deploy.safety import Mode, Operator, make_limits
-from fingers_deploy.simulator.hand import SimulatedHand
+from fingers_robot.behaviour.command import FixedCommand
+from fingers_robot.behaviour.policies import Policies
+from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+from fingers_robot.runtime.core import Core
+from fingers_robot.runtime.link import Answer, decode_answer
+from fingers_robot.runtime.ticker import Tick
+from fingers_robot.safety import Mode, Operator, make_limits
+from fingers_robot.simulator.hand import SimulatedHand
 
 ANSWER_S = 0.001
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from fault_lab import Lab
 
-from fingers_deploy.reading import Health
-from fingers_deploy.safety import Mode, Operator
+from fingers_robot.reading import Health
+from fingers_robot.safety import Mode, Operator
 
 LOSSES = (0.0, 0.01, 0.05, 0.10, 0.20, 0.50)
 

@@ -24,7 +24,7 @@ from hand_files import WALKING, write_model
 from stamp import sentence, stamp
 
 from fingers_deploy.bundle import Bundle, load_bundle
-from fingers_deploy.safety import ROWS, Mode
+from fingers_robot.safety import ROWS, Mode
 
 PARTS = ("matrix", "starts", "links", "processes", "fault_free")
 PHASES, SPACING_S = 20, 0.13

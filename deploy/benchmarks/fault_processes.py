@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.drivers.sim import SimulatorProcess
-from fingers_deploy.record import read_log
-from fingers_deploy.runtime.launcher import Launcher
+from fingers_robot.drivers.sim import SimulatorProcess
+from fingers_robot.record import read_log
+from fingers_robot.runtime.launcher import Launcher
 
 SIGNALS = {
     "S11 policy stopped (SIGSTOP)": ("policy", signal.SIGSTOP),

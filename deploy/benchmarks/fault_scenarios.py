@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from fault_lab import Lab
 
-from fingers_deploy.behaviour.command import Frame
-from fingers_deploy.reading import Health, ImuReading, Reading
 from fingers_deploy.rotations import multiply
-from fingers_deploy.safety import Mode, Operator
+from fingers_robot.behaviour.command import Frame
+from fingers_robot.reading import Health, ImuReading, Reading
+from fingers_robot.safety import Mode, Operator
 
 Rng = np.random.Generator
 Install = Callable[[Lab, Rng], float | None]

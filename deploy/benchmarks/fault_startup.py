@@ -8,8 +8,8 @@ import numpy as np
 from fault_lab import Lab
 
 from fingers_deploy.bundle import Bundle
-from fingers_deploy.reading import Reading
-from fingers_deploy.safety import Mode, Operator
+from fingers_robot.reading import Reading
+from fingers_robot.safety import Mode, Operator
 
 LARGEST_STEP_RAD = 0.02
 ABDUCTION = (1, 5, 9, 13, 17)

@@ -7,7 +7,7 @@ import numpy as np
 from fault_lab import Lab
 from fault_scenarios import Scenario
 
-from fingers_deploy.safety import Mode
+from fingers_robot.safety import Mode
 
 WATCHED_S = 0.3
 

@@ -17,9 +17,9 @@ import numpy as np
 from hand_files import WALKING
 
 from fingers_deploy.bundle import Bundle, load_bundle
-from fingers_deploy.cli.main import main as command
 from fingers_deploy.policy import OnnxPolicy
 from fingers_mjx.bundle import write_bundle
+from fingers_robot.cli.main import main as command
 
 CONTROL = 1000
 KINDS = ("bit flip", "byte", "truncation", "insertion", "swap", "manifest edit")

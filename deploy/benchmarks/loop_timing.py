@@ -23,12 +23,12 @@ from hand_files import WALKING, write_model
 from witness import Pauses, witnesses
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.drivers.sim import SimulatorProcess
-from fingers_deploy.record import read_log
-from fingers_deploy.runtime.launcher import Launcher
-from fingers_deploy.runtime.realtime import resident_mb
-from fingers_deploy.runtime.stats import LATE_S
-from fingers_deploy.safety import Mode
+from fingers_robot.drivers.sim import SimulatorProcess
+from fingers_robot.record import read_log
+from fingers_robot.runtime.launcher import Launcher
+from fingers_robot.runtime.realtime import resident_mb
+from fingers_robot.runtime.stats import LATE_S
+from fingers_robot.safety import Mode
 
 SAMPLE_S, CONTROL_S = 10.0, 0.02
 REACTION_S = 0.3  # a stop comes so long after the pause that it answers

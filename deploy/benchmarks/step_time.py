@@ -18,10 +18,10 @@ from hand_files import WALKING
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.policy import Runtime
-from fingers_deploy.reading import Health, ImuReading, Reading
 from fingers_deploy.rotations import conjugate, gravity
-from fingers_deploy.runtime.realtime import resident_mb
-from fingers_deploy.safety import (
+from fingers_robot.reading import Health, ImuReading, Reading
+from fingers_robot.runtime.realtime import resident_mb
+from fingers_robot.safety import (
     Inputs,
     Mode,
     Operator,
@@ -30,7 +30,7 @@ from fingers_deploy.safety import (
     make_limits,
     step,
 )
-from fingers_deploy.safety.detect_policy import complement
+from fingers_robot.safety.detectors.policy import complement
 
 WARM_UP = 2000
 

@@ -28,13 +28,13 @@ from envs.keyboard_model import ACTUATION_M, ARROWS
 from envs.push_scene import HALF_M
 from envs.recovery_falls import load_falls
 from envs.registry import make_batch
-from fingers_deploy.behaviour.command import FixedCommand
-from fingers_deploy.behaviour.key_runner import KeyRunner
-from fingers_deploy.behaviour.tracker_port import TrackerPort
-from fingers_deploy.behaviour.upright import tilt_angle
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.rotations import heading, multiply
-from fingers_deploy.safety import Mode, Operator
+from fingers_robot.behaviour.command import FixedCommand
+from fingers_robot.behaviour.key_runner import KeyRunner
+from fingers_robot.behaviour.tracker_port import TrackerPort
+from fingers_robot.behaviour.upright import tilt_angle
+from fingers_robot.safety import Mode, Operator
 
 POLICIES = WALKING.parent
 CAMERA_S, LATE_S, CONTROL_S = 1 / 60, 0.04, 0.02

@@ -24,9 +24,9 @@ from fault_links import LossyLink
 from hand_files import WALKING, write_model
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.reading import Health
 from fingers_deploy.rotations import gravity, heading, multiply, tilt, unrotate
-from fingers_deploy.safety import Mode
+from fingers_robot.reading import Health
+from fingers_robot.safety import Mode
 
 LOSS = (0.0, 0.05, 0.10, 0.20, 0.30, 0.40, 0.50)
 LATENCY_S = (0.0, 0.005, 0.010, 0.020, 0.030, 0.040, 0.050, 0.060)

@@ -11,9 +11,9 @@ from fault_trials import passes, run_trial
 from hand_files import WALKING, standing_bundle
 
 from fingers_deploy import load_bundle
-from fingers_deploy.drivers.sim import SimulatorProcess
-from fingers_deploy.runtime.launcher import EXIT_TRIP, Launcher
-from fingers_deploy.safety import ROWS, Mode, Operator
+from fingers_robot.drivers.sim import SimulatorProcess
+from fingers_robot.runtime.launcher import EXIT_TRIP, Launcher
+from fingers_robot.safety import ROWS, Mode, Operator
 
 SEED = 500
 FAST, SLOW = 20, 100

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from fingers_deploy.runtime.launcher import LAST_S
+from fingers_robot.runtime.launcher import LAST_S
 
 UNITS = Path(__file__).parents[1] / "systemd"
 
@@ -56,7 +56,7 @@ def service(hand_model, marching_dir, tmp_path):
     path = tmp_path / "console"
     os.mkfifo(path)
     pipe = os.open(path, os.O_RDWR)
-    program = [sys.executable, "-m", "fingers_deploy", "run", str(marching_dir)]
+    program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--no-record"]
     process = subprocess.Popen(
         [*program, "--wiggle", "none"],

@@ -11,10 +11,10 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import stance_of
 from envs.recovery_settle import Settle, action_toward, start_settling
 from envs.registry import make_batch
-from fingers_deploy.behaviour.settle import settle_ramp
-from fingers_deploy.behaviour.upright import tilt_angle, upright_step
 from fingers_deploy.rotations import conjugate, gravity, multiply
 from fingers_mjx.policy_interface import interface_of
+from fingers_robot.behaviour.settle import settle_ramp
+from fingers_robot.behaviour.upright import tilt_angle, upright_step
 
 SEED = 20260124
 DT_S = 0.02

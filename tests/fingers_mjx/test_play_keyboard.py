@@ -15,7 +15,6 @@ from envs.errors import InputError
 from envs.keyboard_fingertip import JOINTS
 from envs.keyboard_model import KEY_NAMES
 from fingers_deploy import load_bundle
-from fingers_deploy.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
 from fingers_mjx.cli_play_keys import key_times, keys_asked, start_board
 from fingers_mjx.evaluate_source import nominal
 from fingers_mjx.play_episodes import play_episodes
@@ -24,6 +23,7 @@ from fingers_mjx.play_keyboard_video import write_keyboard_video
 from fingers_mjx.run_setup import make_env, new_setup
 from fingers_mjx.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
 from fingers_mjx.sokoban_board import draw_panel
+from fingers_robot.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
 
 START = read_level(ONE_BOX)
 SOLUTION = SOLUTIONS[ONE_BOX]

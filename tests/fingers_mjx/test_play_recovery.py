@@ -11,7 +11,6 @@ from support.cli_setup import TRAIN, make_bundle, make_setup, random_weights
 from envs.errors import InputError
 from envs.recovery_falls import Falls
 from fingers_deploy import PolicyController, load_bundle
-from fingers_deploy.behaviour.command import stick_command
 from fingers_deploy.rotations import gravity
 from fingers_mjx import cli_play
 from fingers_mjx.cli import main
@@ -22,6 +21,7 @@ from fingers_mjx.play_episodes import play_episodes
 from fingers_mjx.play_recovery import RecoveryPlayer, check_chain, story
 from fingers_mjx.play_upright import orientation_of
 from fingers_mjx.run_setup import make_env, new_setup
+from fingers_robot.behaviour.command import stick_command
 
 SEED = 20260125
 DT_S = 0.02

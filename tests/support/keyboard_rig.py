@@ -25,7 +25,7 @@ from envs.keyboard_model import (
 )
 from envs.keyboard_stance import FINGER, FINGER_INDEX, PLACEMENT, keyboard_stance
 from envs.scene import build_scene
-from fingers_deploy.simulator.command_path import CommandPath
+from fingers_robot.simulator.command_path import CommandPath
 
 TIP_RADIUS_M, LIFT_M = 0.0075, 0.010
 STEP_RAD = KeyboardConfig().action_scale_rad

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingers_deploy.behaviour.command import (
+from fingers_deploy.errors import InputError
+from fingers_robot.behaviour.command import (
     FRESH_S,
     CommandState,
     FixedCommand,
@@ -15,10 +16,9 @@ from fingers_deploy.behaviour.command import (
     rest_command,
     stick_command,
 )
-from fingers_deploy.behaviour.heading import HeadingConfig, heading_step
-from fingers_deploy.behaviour.joystick import QUIET_S, Joystick
-from fingers_deploy.behaviour.upright import tilt_angle, upright_step
-from fingers_deploy.errors import InputError
+from fingers_robot.behaviour.heading import HeadingConfig, heading_step
+from fingers_robot.behaviour.joystick import QUIET_S, Joystick
+from fingers_robot.behaviour.upright import tilt_angle, upright_step
 
 RANGES = ((0.0, 0.16), (-0.16, 0.16), (-0.45, 0.45))
 DT = 0.02

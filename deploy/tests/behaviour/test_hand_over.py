@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from fingers_deploy import PolicyController
-from fingers_deploy.behaviour.command import FixedCommand
-from fingers_deploy.behaviour.hand_over import (
+from fingers_deploy.rotations import conjugate, gravity
+from fingers_robot.behaviour.command import FixedCommand
+from fingers_robot.behaviour.hand_over import (
     Moment,
     action_for,
     asked_for,
     build_history,
 )
-from fingers_deploy.behaviour.heading import HeadingConfig
-from fingers_deploy.behaviour.policies import Policies
-from fingers_deploy.rotations import conjugate, gravity
-from fingers_deploy.runtime.link import OBSERVATION, decode_answer
-from fingers_deploy.safety import PolicyFault
+from fingers_robot.behaviour.heading import HeadingConfig
+from fingers_robot.behaviour.policies import Policies
+from fingers_robot.runtime.link import OBSERVATION, decode_answer
+from fingers_robot.safety import PolicyFault
 
 SEED = 17
 

@@ -7,10 +7,10 @@ import struct
 import numpy as np
 import pytest
 
-from fingers_deploy.behaviour.key_runner import KeyRunner
-from fingers_deploy.behaviour.keyboard import Keyboard
-from fingers_deploy.behaviour.keys import ARROWS
 from fingers_deploy.errors import InputError
+from fingers_robot.behaviour.key_runner import KeyRunner
+from fingers_robot.behaviour.keyboard import Keyboard
+from fingers_robot.behaviour.keys import ARROWS
 
 DT = 0.02
 

@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from fingers_deploy.behaviour.plan import Plan, read_plan
 from fingers_deploy.errors import InputError
-from fingers_deploy.runtime.link import OBSERVATION, decode_answer
+from fingers_robot.behaviour.plan import Plan, read_plan
+from fingers_robot.runtime.link import OBSERVATION, decode_answer
 
 
 def _write(path, interface, header=None, rows=None):

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fingers_deploy.behaviour.settle import settle_ramp
+from fingers_robot.behaviour.settle import settle_ramp
 
 T0 = 12.34
 TIMES = T0 + np.linspace(-0.1, 4.0, 2001)

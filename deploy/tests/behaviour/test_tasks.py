@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 
 from fingers_deploy import PolicyController
-from fingers_deploy.behaviour.command import FixedCommand, Frame
-from fingers_deploy.behaviour.heading import HeadingConfig
-from fingers_deploy.behaviour.key_runner import KeyRunner
-from fingers_deploy.behaviour.keys import ARROWS
-from fingers_deploy.behaviour.policies import STAND_S, Policies
-from fingers_deploy.behaviour.tracker_port import TrackerPort
 from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.manifest import Observation, Term
 from fingers_deploy.rotations import conjugate, multiply
-from fingers_deploy.runtime.link import OBSERVATION, decode_answer
+from fingers_robot.behaviour.command import FixedCommand, Frame
+from fingers_robot.behaviour.heading import HeadingConfig
+from fingers_robot.behaviour.key_runner import KeyRunner
+from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.policies import STAND_S, Policies
+from fingers_robot.behaviour.tracker_port import TrackerPort
+from fingers_robot.runtime.link import OBSERVATION, decode_answer
 
 INPUTS = {
     "keyboard": (

@@ -7,9 +7,9 @@ import socket
 import numpy as np
 import pytest
 
-from fingers_deploy.behaviour.tracker_port import TrackerPort, read_sample
 from fingers_deploy.errors import InputError
 from fingers_deploy.tracking import Frame, ObjectTracker
+from fingers_robot.behaviour.tracker_port import TrackerPort, read_sample
 
 SAMPLE = {
     "t_s": 3.0,

@@ -10,10 +10,10 @@ import pytest
 from fuzz_bundles import loaded_unchecked
 from fuzz_bundles import measure as damage_bundles
 
-from fingers_deploy.cli.main import main
-from fingers_deploy.record import read_log
-from fingers_deploy.safety import Mode
 from fingers_mjx.bundle import write_bundle
+from fingers_robot.cli.main import main
+from fingers_robot.record import read_log
+from fingers_robot.safety import Mode
 
 
 def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
@@ -32,7 +32,7 @@ def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
 def test_check_survives_a_runtime_that_dies_when_imported(
     bundle_dir, capsys, monkeypatch
 ):
-    import fingers_deploy.cli.check as module
+    import fingers_robot.cli.check as module
 
     monkeypatch.setattr(module, "_PROBE", "import os; os.abort()")
     main(["check", str(bundle_dir)])
@@ -98,7 +98,7 @@ def test_a_bundle_that_is_an_archive_is_refused_not_unpacked(tmp_path, capsys):
 
 def _run(*arguments):
     return subprocess.run(
-        [sys.executable, "-m", "fingers_deploy", *map(str, arguments)],
+        [sys.executable, "-m", "fingers_robot", *map(str, arguments)],
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,
@@ -217,7 +217,7 @@ def test_what_a_process_refuses_ends_the_run(hand_model, marching_dir, more, wor
 
 
 def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
-    program = [sys.executable, "-m", "fingers_deploy", "run", str(marching_dir)]
+    program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--no-record"]
     process = subprocess.Popen(
         [*program, "--duration", "2"],
@@ -237,7 +237,7 @@ def _small_files():
 
 
 def test_a_disk_that_takes_no_more_is_told_at_once(hand_model, marching_dir, tmp_path):
-    program = [sys.executable, "-m", "fingers_deploy", "run", str(marching_dir)]
+    program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--out", str(tmp_path)]
     done = subprocess.run(
         [*program, "--duration", "4"],
@@ -255,7 +255,7 @@ def test_a_disk_that_takes_no_more_is_told_at_once(hand_model, marching_dir, tmp
 
 
 def test_a_reader_that_goes_away_gets_no_traceback(bundle_dir):
-    program = [sys.executable, "-u", "-m", "fingers_deploy", "check", str(bundle_dir)]
+    program = [sys.executable, "-u", "-m", "fingers_robot", "check", str(bundle_dir)]
     process = subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.readline()
     process.stdout.close()

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from fingers_deploy.cli.console import Console
+from fingers_robot.cli.console import Console
 
 
 class FakeLauncher:

@@ -4,8 +4,6 @@ import time
 import numpy as np
 import pytest
 
-from fingers_deploy.drivers.bno085 import Bno085, parse_reports
-from fingers_deploy.drivers.imu_port import ImuPort
 from fingers_deploy.errors import InputError
 from fingers_deploy.rotations import (
     conjugate,
@@ -15,6 +13,8 @@ from fingers_deploy.rotations import (
     tilt,
     unrotate,
 )
+from fingers_robot.drivers.bno085 import Bno085, parse_reports
+from fingers_robot.drivers.imu_port import ImuPort
 
 HALF = np.sqrt(0.5)
 

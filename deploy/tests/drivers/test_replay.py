@@ -1,11 +1,11 @@
 import numpy as np
 import pytest
 
-from fingers_deploy.drivers.dry import DryRun
-from fingers_deploy.drivers.replay import ReplayDriver
 from fingers_deploy.errors import InputError
-from fingers_deploy.record.log import Log
-from fingers_deploy.record.row import ROW
+from fingers_robot.drivers.dry import DryRun
+from fingers_robot.drivers.replay import ReplayDriver
+from fingers_robot.record.log import Log
+from fingers_robot.record.row import ROW
 
 
 def make_log(interface, count=50, joints=None):

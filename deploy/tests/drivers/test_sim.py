@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingers_deploy.drivers.sim import SimDriver, SimulatorProcess
 from fingers_deploy.errors import InputError
-from fingers_deploy.runtime.guard import make_safe
-from fingers_deploy.simulator.command_path import CommandPath
-from fingers_deploy.simulator.hand import SimulatedHand
+from fingers_robot.drivers.sim import SimDriver, SimulatorProcess
+from fingers_robot.runtime.guard import make_safe
+from fingers_robot.simulator.command_path import CommandPath
+from fingers_robot.simulator.hand import SimulatedHand
 
 FREE = '<joint name="root" type="free"/>'
 HINGE = '<joint name="root" type="hinge" axis="0 0 1"/>'
@@ -56,7 +56,7 @@ def test_in_real_time_it_holds_the_last_target_until_a_guard_comes(
 _STARTER = """
 import os, sys
 from fingers_deploy import load_bundle
-from fingers_deploy.drivers.sim import SimulatorProcess
+from fingers_robot.drivers.sim import SimulatorProcess
 interface = load_bundle(sys.argv[2]).manifest.interface
 print(SimulatorProcess(sys.argv[1], interface).process.pid, flush=True)
 os._exit(1)  # as when it is killed

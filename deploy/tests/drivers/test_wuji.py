@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fingers_deploy.drivers.open import open_driver
-from fingers_deploy.drivers.wuji import WujiDriver
 from fingers_deploy.errors import InputError
-from fingers_deploy.reading import ImuReading
 from fingers_deploy.rotations import conjugate
-from fingers_deploy.runtime.core import Core
-from fingers_deploy.runtime.guard import guard_hand, make_safe
-from fingers_deploy.runtime.ticker import Ticker
-from fingers_deploy.safety import Mode, Operator, Proposal, make_limits
-from fingers_deploy.safety.detect_health import unhealthy
-from fingers_deploy.safety.detect_policy import complement
+from fingers_robot.drivers.open import open_driver
+from fingers_robot.drivers.wuji import WujiDriver
+from fingers_robot.reading import ImuReading
+from fingers_robot.runtime.core import Core
+from fingers_robot.runtime.guard import guard_hand, make_safe
+from fingers_robot.runtime.ticker import Ticker
+from fingers_robot.safety import Mode, Operator, Proposal, make_limits
+from fingers_robot.safety.detectors.health import unhealthy
+from fingers_robot.safety.detectors.policy import complement
 
 
 class StillImu:
@@ -223,7 +223,7 @@ class EchoLink:
         self.answer = None
 
     def send(self, packet):
-        from fingers_deploy.runtime.link import Answer
+        from fingers_robot.runtime.link import Answer
 
         proposal = Proposal(
             int(packet["tick"]), complement(int(packet["challenge"])), packet["target"]

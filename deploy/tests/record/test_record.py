@@ -5,9 +5,9 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.record import read_log
-from fingers_deploy.record.recorder import Recorder
-from fingers_deploy.record.row import NAMES, ROW, empty_row, schema_text
+from fingers_robot.record import read_log
+from fingers_robot.record.recorder import Recorder
+from fingers_robot.record.row import NAMES, ROW, empty_row, schema_text
 from sysid.data_bag import BagMap
 from sysid.data_read import read_log as read_measured_log
 
@@ -167,7 +167,7 @@ def test_noise_is_refused_in_one_sentence(tmp_path):
 
 
 def test_files_rotate_and_a_log_is_never_written_over(tmp_path, monkeypatch):
-    monkeypatch.setattr("fingers_deploy.record.recorder.MAX_FILE_BYTES", 20_000)
+    monkeypatch.setattr("fingers_robot.record.recorder.MAX_FILE_BYTES", 20_000)
     recorder, rows = _record(tmp_path, 300)
     assert len(recorder.files) > 3
     assert all(file.stat().st_size < 30_000 for file in recorder.files)

@@ -14,10 +14,10 @@ from hypothesis import strategies as st
 
 import fingers_deploy
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.record.row import ROW
-from fingers_deploy.runtime.core import Core
-from fingers_deploy.runtime.ticker import Tick
-from fingers_deploy.safety import Mode, Operator
+from fingers_robot.record.row import ROW
+from fingers_robot.runtime.core import Core
+from fingers_robot.runtime.ticker import Tick
+from fingers_robot.safety import Mode, Operator
 
 SEED = 7
 PACKAGE = Path(fingers_deploy.__file__).parent

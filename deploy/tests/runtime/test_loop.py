@@ -7,11 +7,11 @@ import sys
 import numpy as np
 import pytest
 
-from fingers_deploy.drivers.open import _OPENERS
-from fingers_deploy.runtime.console import ConsoleLink
-from fingers_deploy.runtime.guard import guard_hand
-from fingers_deploy.runtime.launcher import notify
-from fingers_deploy.runtime.link import (
+from fingers_robot.drivers.open import _OPENERS
+from fingers_robot.runtime.console import ConsoleLink
+from fingers_robot.runtime.guard import guard_hand
+from fingers_robot.runtime.launcher import notify
+from fingers_robot.runtime.link import (
     ANSWER,
     OBSERVATION,
     SupervisorEnd,
@@ -19,9 +19,9 @@ from fingers_deploy.runtime.link import (
     encode_answer,
     make_link,
 )
-from fingers_deploy.runtime.stats import LoopStats, Timing
-from fingers_deploy.runtime.ticker import Ticker
-from fingers_deploy.safety import Operator, PolicyFault, Proposal
+from fingers_robot.runtime.stats import LoopStats, Timing
+from fingers_robot.runtime.ticker import Ticker
+from fingers_robot.safety import Operator, PolicyFault, Proposal
 
 
 class Fake:
@@ -220,7 +220,7 @@ def test_systemd_is_told(tmp_path):
 _PREFER = """
 import gc, os, sys, threading, time
 threading.Thread(target=time.sleep, args=(5,), daemon=True).start()
-from fingers_deploy.runtime.realtime import prefer_this_process
+from fingers_robot.runtime.realtime import prefer_this_process
 if sys.argv[1] == "refused":
     def refuse(*args):
         raise PermissionError(1, "Operation not permitted")
@@ -254,7 +254,7 @@ def test_what_was_obtained_is_reported(case):
 def test_an_interrupt_does_not_reach_the_hand_first(number):
     program = (
         "import os, signal;"
-        "from fingers_deploy.runtime.signals import ignore_interrupts;"
+        "from fingers_robot.runtime.signals import ignore_interrupts;"
         f"ignore_interrupts(); os.kill(os.getpid(), signal.{number}); print('alive')"
     )
     done = subprocess.run(

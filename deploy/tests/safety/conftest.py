@@ -4,9 +4,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from fingers_deploy.reading import Health, ImuReading, Reading
 from fingers_deploy.rotations import conjugate
-from fingers_deploy.safety import (
+from fingers_robot.reading import Health, ImuReading, Reading
+from fingers_robot.safety import (
     Inputs,
     Mode,
     Operator,
@@ -15,7 +15,7 @@ from fingers_deploy.safety import (
     make_limits,
     step,
 )
-from fingers_deploy.safety.detect_policy import complement
+from fingers_robot.safety.detectors.policy import complement
 
 DT = 0.002
 CONTROL_STEPS = 10

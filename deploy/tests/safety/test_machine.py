@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingers_deploy.safety import Mode, Operator, PolicyFault, Reaction, step
-from fingers_deploy.safety.latch import severest
-from fingers_deploy.safety.limits import make_limits
-from fingers_deploy.safety.machine import CONFIRM_TRIES, TRANSITIONS, Event
+from fingers_robot.safety import Mode, Operator, PolicyFault, Reaction, step
+from fingers_robot.safety.latch import severest
+from fingers_robot.safety.limits import make_limits
+from fingers_robot.safety.machine import CONFIRM_TRIES, TRANSITIONS, Event
 
 DT = 0.002
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from fingers_deploy.rotations import multiply
-from fingers_deploy.safety import ROWS, Mode, Operator, PolicyFault, Reaction
-from fingers_deploy.safety.latch import severest
-from fingers_deploy.safety.limits import make_limits
-from fingers_deploy.safety.table import BY_ID
+from fingers_robot.safety import ROWS, Mode, Operator, PolicyFault, Reaction
+from fingers_robot.safety.latch import severest
+from fingers_robot.safety.limits import make_limits
+from fingers_robot.safety.table import BY_ID
 
 DT = 0.002
 

@@ -1,0 +1,1 @@
+"""The robot side of a policy: drivers, loop, supervisor, recorder, behaviours."""

@@ -1,0 +1,209 @@
+"""`fingers-deploy run | record | guard`: from options to a run at the console."""
+
+import argparse
+import contextlib
+import math
+from typing import Any
+
+from fingers_deploy.bundle import load_bundle
+from fingers_deploy.errors import InputError
+from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_robot.behaviour.joystick import QUIET_S
+from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.cli.console import REFUSED, drive
+from fingers_robot.cli.options import check_library, check_options, check_sources
+from fingers_robot.drivers.open import KINDS
+from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
+from fingers_robot.runtime.guard import guard_hand
+
+WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
+
+
+def add_run(commands: Any) -> None:
+    """Adds the command `run`."""
+    parser = commands.add_parser("run", help="run policies on a hand")
+    parser.add_argument("bundles", nargs="+", help="folders or ONNX files")
+    _add_driver(parser)
+    _add_loop(parser)
+    parser.add_argument(
+        "--runtime", choices=("auto", "onnxruntime", "numpy"), default="auto"
+    )
+    parser.add_argument("--joystick", metavar="DEVICE", help="e.g. /dev/input/js0")
+    parser.add_argument(
+        "--joystick-quiet",
+        type=float,
+        default=QUIET_S,
+        metavar="S",
+        help="a stick held out so long without the slightest change counts as a lost "
+        "gamepad (2); 0: never, where the device goes away with the radio link",
+    )
+    parser.add_argument(
+        "--sticks", type=float, nargs="*", default=[], help="fixed sticks, −1 to 1"
+    )
+    parser.add_argument(
+        "--heading-hold",
+        type=float,
+        nargs=2,
+        metavar=("GAIN", "OFFSET"),
+        help="hold the heading: gain [1/s], constant yaw rate [rad/s]",
+    )
+    parser.add_argument(
+        "--keys", nargs="+", choices=ARROWS, metavar="KEY", help="keyboard: to press"
+    )
+    parser.add_argument(
+        "--keyboard", metavar="DEVICE", help="keyboard: /dev/input/… of its key events"
+    )
+    parser.add_argument(
+        "--tracker", metavar="PATH", help="push: local socket for a camera's samples"
+    )
+    parser.set_defaults(command=run, plan=None, told=True)
+
+
+def add_record(commands: Any) -> None:
+    """Adds the command `record`."""
+    parser = commands.add_parser(
+        "record", help="record a hand at rest, or while it follows a plan of targets"
+    )
+    parser.add_argument("bundles", nargs=1, help="bundle with the hand's joints")
+    parser.add_argument("--plan", metavar="CSV", help="columns t and cmd.<joint>")
+    _add_driver(parser)
+    _add_loop(parser)
+    parser.set_defaults(
+        command=run,
+        runtime="numpy",
+        joystick=None,
+        joystick_quiet=QUIET_S,
+        sticks=[],
+        heading_hold=None,
+        keys=None,
+        keyboard=None,
+        tracker=None,
+        told=False,
+    )
+
+
+def add_guard(commands: Any) -> None:
+    """Adds the command `guard`."""
+    parser = commands.add_parser("guard", help="de-energize a hand, nothing else")
+    parser.add_argument("bundles", nargs=1, help="bundle with the hand's joints")
+    _add_driver(parser)
+    parser.set_defaults(command=guard)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Runs or records; returns the exit status."""
+    check_options(options)
+    # Refused here, before any process starts and any device is opened.
+    bundles = [load_bundle(path) for path in options.bundles]
+    if options.told:
+        check_sources(options, bundles)
+    driver = _driver(options)
+    with contextlib.ExitStack() as stack:
+        if options.driver == "sim" and not options.socket:
+            interface = bundles[0].manifest.interface
+            simulator = SimulatorProcess(options.model, interface, seed=options.seed)
+            driver["socket"] = stack.enter_context(simulator).path
+        heading = options.heading_hold
+        plain = {
+            "bundles": options.bundles,
+            "driver": driver,
+            "loop_hz": options.loop_hz,
+            "record": None if options.no_record else options.out,
+            "mounting": options.mounting,
+            "realtime": not options.no_realtime,
+            "wiggle": WIGGLES[options.wiggle],
+            "runtime": options.runtime,
+            "joystick": options.joystick,
+            "joystick_quiet_s": options.joystick_quiet,
+            "sticks": options.sticks,
+            "plan": options.plan,
+            "keys": options.keys,
+            "keyboard": options.keyboard,
+            "tracker": options.tracker,
+            "heading_hold": heading
+            and {"gain": heading[0], "offset_rad_s": heading[1]},
+        }
+        status = drive(plain, options.arm, options.duration)
+        if options.driver == "sim" and status != REFUSED:
+            _tell_distance(driver["socket"], bundles[0].manifest.interface)
+        return status
+
+
+def _tell_distance(socket: str, interface: Interface) -> None:
+    """Prints where the simulated hand is now; its origin is where it stood first."""
+    try:
+        x, y = where_the_palm_is(socket, interface)
+    except OSError:
+        return  # a simulator of the user's own that has ended
+    away_m = math.hypot(x, y)
+    print(f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)")
+
+
+def guard(options: argparse.Namespace) -> int:
+    """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
+    interface = load_bundle(options.bundles[0]).manifest.interface
+    check_library(options.driver)
+    if options.driver == "sim" and not options.socket:
+        raise InputError("--driver sim", "", "no hand", "--socket PATH of a simulator")
+    safe, words = guard_hand(_driver(options), interface)
+    print(words)
+    return 0 if safe else 5
+
+
+def _add_driver(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("driver")
+    group.add_argument("--driver", choices=KINDS, required=True)
+    group.add_argument("--dry-run", action="store_true", help="never energize")
+    group.add_argument("--model", help="sim: MJCF or MJB file of the hand")
+    group.add_argument("--socket", help="sim: of a simulator that runs already")
+    group.add_argument("--seed", type=int, default=0, help="sim: of the sensor noise")
+    group.add_argument("--log", help="replay: MCAP file of a run")
+    group.add_argument("--side", choices=("right", "left"), default="right")
+    group.add_argument("--serial", help="wuji: serial number of the hand")
+    group.add_argument("--imu-bus", type=int, default=1, help="wuji: I²C bus")
+    group.add_argument("--imu-address", type=int, default=0x4A, help="wuji")
+    group.add_argument(
+        "--imu-mount",
+        type=float,
+        nargs=4,
+        default=[1.0, 0.0, 0.0, 0.0],
+        metavar=("W", "X", "Y", "Z"),
+        help="wuji: orientation of the IMU in the palm frame",
+    )
+
+
+def _add_loop(parser: argparse.ArgumentParser) -> None:
+    group = parser.add_argument_group("loop")
+    group.add_argument("--loop-hz", type=float, default=500.0)
+    group.add_argument(
+        "--no-realtime", action="store_true", help="do not ask for SCHED_FIFO"
+    )
+    group.add_argument("--wiggle", choices=tuple(WIGGLES), default="all")
+    group.add_argument("--out", default=".", help="folder of the recording")
+    group.add_argument("--no-record", action="store_true")
+    group.add_argument("--mounting", choices=("free", "palm_fixed"), default="free")
+    group.add_argument(
+        "--arm",
+        action="store_true",
+        help="arm at once; only in simulation, replay and dry runs",
+    )
+    group.add_argument(
+        "--duration",
+        type=float,
+        metavar="S",
+        help="stop after so many seconds, with --arm counted from the first step",
+    )
+
+
+def _driver(options: argparse.Namespace) -> dict[str, Any]:
+    return {
+        "kind": options.driver,
+        "dry_run": options.dry_run,
+        "socket": options.socket,
+        "log": options.log,
+        "side": options.side,
+        "serial": options.serial,
+        "imu_bus": options.imu_bus,
+        "imu_address": options.imu_address,
+        "imu_mount": options.imu_mount,
+    }

@@ -1,0 +1,211 @@
+"""Driver of the simulated hand, which runs in another process."""
+
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fingers_deploy.errors import InputError
+from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_robot.drivers.sim_packets import STATE, Ask, request
+from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+
+Array = NDArray[np.float64]
+_START_S, _ANSWER_S = 30.0, 2.0
+TEMPERATURE_C, SUPPLY_V = 40.0, 14.8
+
+
+class SimDriver:
+    """A hand in MuJoCo, over a local socket, in real time or in lockstep.
+
+    Args:
+        path: path of the simulator's socket.
+        interface: of the policy: joint names and limits.
+        lockstep: the simulator only advances when `advance` is called.
+
+    Raises:
+        ConnectionError: there is no simulator at this path.
+    """
+
+    def __init__(self, path: str | Path, interface: Interface, lockstep: bool = False):
+        self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        self._socket.connect(str(path))
+        self._socket.setblocking(lockstep)
+        self._lockstep, self.over = lockstep, False
+        self._state: np.void | None = None
+        self.info = DriverInfo(
+            name=f"simulated hand at {path}",
+            joint_names=interface.joint_names,
+            joint_limits_rad=np.asarray(interface.joint_limits_rad, np.float64),
+            lowpass_hz=interface.command_path.lowpass_hz,
+        )
+
+    def advance(self, t_s: float) -> None:
+        """Lockstep: lets the simulation run up to `t_s`, and takes its state."""
+        self._socket.send(request(Ask.ADVANCE, t_s))
+        self._take(self._socket.recv(STATE.itemsize))
+
+    @property
+    def state(self) -> np.void | None:
+        """The newest packet, with the true pose of the palm, for measurements."""
+        return self._state
+
+    def read(self) -> Reading | None:
+        """As the protocol says."""
+        if not self._lockstep:
+            self._drain()
+        s = self._state
+        return None if s is None else Reading(float(s["t_s"]), s["pos"], s["effort"])
+
+    def imu(self) -> ImuReading | None:
+        """As the protocol says."""
+        s = self._state
+        return None if s is None else ImuReading(float(s["t_s"]), s["quat"], s["gyro"])
+
+    def health(self) -> Health | None:
+        """As the protocol says."""
+        s = self._state
+        if s is None:
+            return None
+        return Health(
+            t_s=float(s["health_t_s"]),
+            enabled=bool(s["enabled"]),
+            disabled=not s["enabled"],
+            temperature_c=np.full(JOINT_COUNT, TEMPERATURE_C),
+            bus_v=SUPPLY_V,
+            error_code=np.zeros(JOINT_COUNT, np.uint32),
+            effort_limit_a=np.ones(JOINT_COUNT),
+            pos_rad=s["pos"],
+        )
+
+    def write(self, target_rad: Array) -> None:
+        """As the protocol says."""
+        self._socket.send(request(Ask.TARGET, target=target_rad))
+
+    def enable(self) -> None:
+        """As the protocol says."""
+        self._socket.send(request(Ask.ENABLE))
+
+    def disable(self) -> None:
+        """As the protocol says."""
+        self._socket.send(request(Ask.DISABLE))
+
+    def close(self) -> None:
+        """As the protocol says."""
+        try:
+            self.disable()
+        except OSError:
+            pass  # the simulator or the socket is gone already
+        finally:
+            self._socket.close()
+
+    def _drain(self) -> None:
+        """Takes the newest packet; older ones are of no use."""
+        while True:
+            try:
+                data = self._socket.recv(STATE.itemsize)
+            except BlockingIOError:
+                return
+            self._take(data)
+
+    def _take(self, data: bytes) -> None:
+        if len(data) != STATE.itemsize:
+            raise ConnectionError("the simulator has gone")
+        self._state = np.frombuffer(data, STATE)[0]
+
+
+def where_the_palm_is(path: str | Path, interface: Interface) -> tuple[float, float]:
+    """Asks a simulator in real time for the place of the palm on the floor [m].
+
+    Raises:
+        OSError: there is no simulator at this path, or none that answers.
+    """
+    driver = SimDriver(path, interface)
+    try:
+        deadline = time.monotonic() + _ANSWER_S
+        while driver.read() is None or driver.state is None:
+            if time.monotonic() > deadline:
+                raise TimeoutError("the simulator does not answer")
+            time.sleep(0.005)
+        x, y, _ = driver.state["base_pos"].tolist()
+        return x, y
+    finally:
+        driver.close()
+
+
+class SimulatorProcess:
+    """Starts and ends the simulator's process.
+
+    Args:
+        model: MJCF or MJB file.
+        interface: of the policy: joint names and command path.
+        lockstep: advance only when asked.
+        seed: seed of the sensor noise.
+        lifetime_s: real time after which the simulator ends by itself [s].
+
+    Raises:
+        InputError: the simulator refuses the model or cannot start.
+    """
+
+    def __init__(
+        self,
+        model: str | Path,
+        interface: Interface,
+        lockstep: bool = False,
+        seed: int = 0,
+        lifetime_s: float = 86400.0,
+    ):
+        self._folder = tempfile.TemporaryDirectory(prefix="fingers-sim-")
+        self.path = str(Path(self._folder.name) / "hand")
+        chain = interface.command_path
+        arguments = [
+            f"--socket={self.path}",
+            f"--joints={','.join(interface.joint_names)}",
+            f"--delay-s={chain.delay_s}",
+            f"--lowpass-hz={chain.lowpass_hz or 1e6}",
+            f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
+            f"--seed={seed}",
+            f"--lifetime-s={lifetime_s}",
+            f"--parent={os.getpid()}",
+        ]
+        if lockstep:
+            arguments.append("--lockstep")
+        program = [sys.executable, "-m", "fingers_robot.simulator.server"]
+        self.process = subprocess.Popen(
+            [*program, str(Path(model).absolute()), *arguments],
+            cwd=self._folder.name,  # where MuJoCo writes its log
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        self._wait()
+
+    def close(self) -> None:
+        """Ends the process."""
+        if self.process.poll() is None:
+            self.process.kill()
+        self.process.communicate()
+        self._folder.cleanup()
+
+    def __enter__(self) -> "SimulatorProcess":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def _wait(self) -> None:
+        deadline = time.monotonic() + _START_S
+        while not os.path.exists(self.path):
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                self.process.kill()
+                _, message = self.process.communicate()
+                self._folder.cleanup()
+                lines = message.strip().splitlines() or ["no answer"]
+                valid = "a model that it can run, and the extra fingers-deploy[sim]"
+                raise InputError("simulator", "", lines[-1], valid)
+            time.sleep(0.01)

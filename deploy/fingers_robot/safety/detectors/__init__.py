@@ -1,0 +1,1 @@
+"""Detectors of faults: pure functions of one reading and of what is remembered."""
