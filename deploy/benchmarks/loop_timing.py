@@ -18,7 +18,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from fault_processes import NEXT, plain_options
+from faults.processes import NEXT, plain_options
 from hand_files import WALKING, write_model
 from witness import Pauses, witnesses
 

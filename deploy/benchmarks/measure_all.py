@@ -19,7 +19,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
-from fault_matrix import as_markdown
+from faults.matrix import as_markdown
 from report import STAMPS, page, read_results
 from stamp import stamp
 from walking_quality import draw

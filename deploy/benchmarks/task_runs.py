@@ -21,7 +21,7 @@ from pathlib import Path
 
 import mujoco
 import numpy as np
-from fault_lab import Lab
+from faults.lab import Lab
 from hand_files import WALKING, write_model
 
 from envs.keyboard_model import ACTUATION_M, ARROWS

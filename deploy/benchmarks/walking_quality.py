@@ -19,8 +19,8 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from fault_lab import Lab
-from fault_links import LossyLink
+from faults.lab import Lab
+from faults.links import LossyLink
 from hand_files import WALKING, write_model
 
 from fingers_deploy.bundle import load_bundle

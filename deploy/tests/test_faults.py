@@ -2,12 +2,12 @@
 
 import numpy as np
 import pytest
-from fault_lab import Lab, snapshots
-from fault_links import LOSSES, burst, measure_loss
-from fault_processes import SIGNALS, WITHIN_S, kill_one, plain_options
-from fault_scenarios import SCENARIOS
-from fault_startup import STARTS, start_up, stopped_rightly
-from fault_trials import passes, run_trial
+from faults.lab import Lab, snapshots
+from faults.links import LOSSES, burst, measure_loss
+from faults.processes import SIGNALS, WITHIN_S, kill_one, plain_options
+from faults.scenarios import SCENARIOS
+from faults.startup import STARTS, start_up, stopped_rightly
+from faults.trials import passes, run_trial
 from hand_files import WALKING, standing_bundle
 
 from fingers_deploy import load_bundle

@@ -4,7 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from fault_matrix import as_markdown
+from faults.matrix import as_markdown
 from goals import goals
 from report import page, read_results
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fault_lab import Lab
+from faults.lab import Lab
 from hand_files import WALKING, marching_bundle
 from hypothesis import given, settings
 from hypothesis import strategies as st

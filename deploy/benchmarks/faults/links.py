@@ -4,7 +4,7 @@ import copy
 from dataclasses import dataclass
 
 import numpy as np
-from fault_lab import Lab
+from faults.lab import Lab
 
 from fingers_robot.reading import Health
 from fingers_robot.safety import Mode, Operator

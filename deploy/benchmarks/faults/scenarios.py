@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from fault_lab import Lab
+from faults.lab import Lab
 
 from fingers_deploy.rotations import multiply
 from fingers_robot.behaviour.command import Frame

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from fault_lab import Lab
+from faults.lab import Lab
 
 from fingers_deploy.bundle import Bundle
 from fingers_robot.reading import Reading

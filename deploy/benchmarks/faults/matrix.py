@@ -1,6 +1,6 @@
 """The fault matrix: every row of the safety table, many times, as a table.
 
-    python deploy/benchmarks/fault_matrix.py --trials 100 --hours 1 --out OUT
+    python deploy/benchmarks/faults/matrix.py --trials 100 --hours 1 --out OUT
 
 writes `<out>.md` and `<out>.json` for the committed policy. Parts that an earlier call
 left in `<out>.json` stay: `--parts links` measures only these again.
@@ -14,12 +14,12 @@ import time
 from pathlib import Path
 
 import numpy as np
-from fault_lab import Lab, snapshots
-from fault_links import LOSSES, burst, measure_loss
-from fault_processes import SIGNALS, WITHIN_S, kill_one
-from fault_scenarios import SCENARIOS, Scenario
-from fault_startup import STARTS, start_up, stopped_rightly
-from fault_trials import passes, run_trial
+from faults.lab import Lab, snapshots
+from faults.links import LOSSES, burst, measure_loss
+from faults.processes import SIGNALS, WITHIN_S, kill_one
+from faults.scenarios import SCENARIOS, Scenario
+from faults.startup import STARTS, start_up, stopped_rightly
+from faults.trials import passes, run_trial
 from hand_files import WALKING, write_model
 from stamp import sentence, stamp
 
@@ -181,7 +181,7 @@ def as_markdown(results: dict) -> str:
     when = {part: sentence(each) for part, each in results["measured"].items()}
     parts = [
         "# Safety table",
-        "Written by `python deploy/benchmarks/fault_matrix.py`; see `docs/deploy.md` "
+        "Written by `python deploy/benchmarks/faults/matrix.py`; see `docs/deploy.md` "
         "for what a software supervisor is not. Everything here is measured on a "
         "simulated hand, on a desktop processor, never yet on a real one.",
         "## Rules",

@@ -4,8 +4,8 @@ import copy
 from dataclasses import dataclass
 
 import numpy as np
-from fault_lab import Lab
-from fault_scenarios import Scenario
+from faults.lab import Lab
+from faults.scenarios import Scenario
 
 from fingers_robot.safety import Mode
 
