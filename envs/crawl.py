@@ -8,12 +8,11 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from envs.commands import CommandConfig, sample_command
+from envs.env import HandEnv
 from envs.errors import InputError
 from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
-from envs.hand_env import HandEnv
-from envs.hand_task import BareTask
 from envs.memory import Lasting, Memory
 from envs.physics import PhysicsState
 from envs.plant import Plant, check_interval
@@ -22,6 +21,7 @@ from envs.scoring import check_weights
 from envs.signals import Signals
 from envs.start import near_stance
 from envs.streams import stream
+from envs.task import BareTask
 from rewards import (
     CRAWL,
     RewardTable,
@@ -81,7 +81,7 @@ class CrawlConfig:
 
 @dataclass(frozen=True)
 class Crawl(BareTask):
-    """The crawl task as `envs.hand_task.HandTask`.
+    """The crawl task as `envs.task.HandTask`.
 
     Attributes:
         config: settings of the task.
@@ -151,7 +151,7 @@ class CrawlEnv(HandEnv):
 
     Args:
         config: settings of the task.
-        backend, num_worlds, hand, stance: see `envs.hand_env.HandEnv`.
+        backend, num_worlds, hand, stance: see `envs.env.HandEnv`.
     """
 
     def __init__(

@@ -11,12 +11,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from envs.env import HandEnv
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
 from envs.hand.stance import Stance
-from envs.hand_env import HandEnv
-from envs.hand_settings import HandSettings
 from envs.keyboard_fingertip import TIP_RADIUS_M, fingertip_v
 from envs.keyboard_measures import press_measures
 from envs.keyboard_model import (
@@ -52,6 +51,7 @@ from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply, rotate, unrotate
 from envs.scoring import check_weights
+from envs.settings import HandSettings
 from envs.signals import Signals
 from envs.streams import stream
 from rewards import KEYBOARD, RewardTable, safe_norm, support_drift
@@ -114,7 +114,7 @@ class KeyboardMemory:
 
 @dataclass(frozen=True)
 class Keyboard:
-    """Keyboard pressing as `envs.hand_task.HandTask`.
+    """Keyboard pressing as `envs.task.HandTask`.
 
     Attributes:
         config: settings of the task.
@@ -346,7 +346,7 @@ class KeyboardEnv(HandEnv):
 
     Args:
         config: settings of the task.
-        backend, num_worlds, hand, stance: see `envs.hand_env.HandEnv`; the stance is
+        backend, num_worlds, hand, stance: see `envs.env.HandEnv`; the stance is
             the one before the keyboard if not given.
     """
 

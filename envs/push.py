@@ -18,13 +18,11 @@ from envs.camera import (
     start_camera,
     step_camera,
 )
+from envs.env import HandEnv
 from envs.errors import check_ordered
 from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
-from envs.hand_env import HandEnv
-from envs.hand_settings import HandSettings
-from envs.hand_task import BareTask
 from envs.memory import Lasting, Memory
 from envs.object_tracking import Track, start_track, step_track, track_inputs
 from envs.observations import InputTerm, Sample
@@ -35,9 +33,11 @@ from envs.push_measures import push_measures
 from envs.push_scene import CUBE, HALF_M, POS, VEL, add_cube, place_cube
 from envs.rotations import multiply, rotate, unrotate
 from envs.scoring import check_weights
+from envs.settings import HandSettings
 from envs.signals import Signals
 from envs.start import near_stance
 from envs.streams import stream
+from envs.task import BareTask
 from rewards import (
     PUSH,
     RewardTable,
@@ -116,7 +116,7 @@ class PushMemory:
 
 @dataclass(frozen=True)
 class Push(BareTask):
-    """Object pushing as `envs.hand_task.HandTask`.
+    """Object pushing as `envs.task.HandTask`.
 
     Attributes:
         config: settings of the task.
@@ -299,7 +299,7 @@ class PushEnv(HandEnv):
 
     Args:
         config: settings of the task.
-        backend, num_worlds, hand, stance: see `envs.hand_env.HandEnv`.
+        backend, num_worlds, hand, stance: see `envs.env.HandEnv`.
     """
 
     def __init__(

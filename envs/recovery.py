@@ -11,11 +11,9 @@ from jaxtyping import Array, Bool, Float, Int
 
 from envs.base import State
 from envs.commands import CommandConfig, sample_command
+from envs.env import HandEnv
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
-from envs.hand_env import HandEnv
-from envs.hand_settings import HandSettings
-from envs.hand_task import BareTask
 from envs.memory import Lasting, Memory
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
@@ -32,8 +30,10 @@ from envs.recovery_settle import (
 )
 from envs.rotations import about_z, multiply, unrotate
 from envs.scoring import check_weights
+from envs.settings import HandSettings
 from envs.signals import Signals
 from envs.streams import stream
+from envs.task import BareTask
 from rewards import RECOVERY, RewardTable
 
 
@@ -85,7 +85,7 @@ class RecoveryMemory:
 
 @dataclass(frozen=True)
 class Recovery(BareTask):
-    """Fall recovery as `envs.hand_task.HandTask`.
+    """Fall recovery as `envs.task.HandTask`.
 
     Attributes:
         config: settings of the task.
@@ -241,7 +241,7 @@ class RecoveryEnv(HandEnv):
 
     Args:
         config: settings of the task.
-        backend, num_worlds, hand, stance: see `envs.hand_env.HandEnv`.
+        backend, num_worlds, hand, stance: see `envs.env.HandEnv`.
     """
 
     def __init__(

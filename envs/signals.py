@@ -50,7 +50,7 @@ class Signals:
         command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
         action: clipped policy output of this step.
         previous_action: clipped policy output of the step before.
-        extra: the task's own signals by name, see `envs.hand_task.HandTask`.
+        extra: the task's own signals by name, see `envs.task.HandTask`.
     """
 
     joint_pos: Float[Array, "*b 20"]

@@ -11,7 +11,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from envs.hand_env import HandEnv
+from envs.env import HandEnv
 
 
 @dataclass(frozen=True)

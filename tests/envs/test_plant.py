@@ -59,7 +59,7 @@ def test_room_for_contacts_is_a_setting(monkeypatch):
         given.update(options, worlds=worlds, substeps=substeps)
         return make_physics(backend, model, substeps, worlds, **options)
 
-    from envs import hand_env
+    from envs import env as hand_env
 
     make_physics = hand_env.make_physics
     monkeypatch.setattr(hand_env, "make_physics", spy)

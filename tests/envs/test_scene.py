@@ -11,13 +11,13 @@ import pytest
 
 from envs.commands import CommandConfig
 from envs.crawl import Crawl, CrawlConfig
+from envs.env import HandEnv
 from envs.errors import InputError
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
 from envs.hand.spec import HAND_NQ, HAND_NV, hand_spec
 from envs.hand.stance import load_stance
-from envs.hand_env import HandEnv
 from envs.scene import build_scene
 
 HAND, Q_OFF = load_hand_file(), load_stance().q_off

@@ -19,7 +19,7 @@ from support.probe_envs import Fault, probe
 from support.train_setup import assert_same_end, curve, leaves, make_env, run
 
 from envs.errors import InputError
-from envs.hand_settings import HandSettings
+from envs.settings import HandSettings
 from fingers_mjx import checkpoint
 from fingers_mjx.checkpoint_tree import to_host
 from fingers_mjx.ppo_policy import act, load_policy

@@ -1,6 +1,6 @@
 """A task from outside the packages: the hand crouches at half its stance's height.
 
-A configuration, methods of `envs.hand_task.HandTask`, and one call of `register`.
+A configuration, methods of `envs.task.HandTask`, and one call of `register`.
 """
 
 from dataclasses import dataclass, field
@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import jax.numpy as jnp
 
 from envs.commands import CommandConfig
-from envs.hand_env import HandEnv
-from envs.hand_settings import HandSettings
-from envs.hand_task import BareTask
+from envs.env import HandEnv
 from envs.registry import Task, register
+from envs.settings import HandSettings
 from envs.start import near_stance
+from envs.task import BareTask
 from rewards import RewardTerm, action_rate, stance_height
 
 CROUCH = (

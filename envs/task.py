@@ -67,7 +67,7 @@ class HandConfig(Protocol):
 
 
 class HandTask(Protocol):
-    """A task for `envs.hand_env.HandEnv`, which does everything else.
+    """A task for `envs.env.HandEnv`, which does everything else.
 
     All methods are pure functions of one world. A task keeps what it carries in fields
     of `Lasting` and `Memory`; both have a field `task` for a pytree of its own. Where a

@@ -14,7 +14,6 @@ from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec
 from envs.hand.stance import Stance, stance_of
-from envs.hand_task import HandTask
 from envs.memory import Lasting, Memory
 from envs.observations import InputTerm, Sample, flatten, push, start_history
 from envs.physics import (
@@ -32,6 +31,7 @@ from envs.scoring import scheduled_weights, score
 from envs.sensing import imu_of, sense
 from envs.signals import Command, Signals, extract_signals
 from envs.streams import stream
+from envs.task import HandTask
 from rewards import RewardTable
 
 

@@ -8,7 +8,7 @@ from envs.randomize import RandomizeConfig
 
 @dataclass(frozen=True)
 class HandSettings:
-    """Settings that `envs.hand_env.HandEnv` reads.
+    """Settings that `envs.env.HandEnv` reads.
 
     Attributes:
         episode_s: episode length (paper).
