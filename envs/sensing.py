@@ -3,7 +3,7 @@
 import jax
 from jaxtyping import Array, Float
 
-from envs.hand.effects.surroundings import Imu
+from envs.actuator.surroundings import Imu
 from envs.memory import Lasting
 from envs.observations import Sample
 from envs.physics import PhysicsState

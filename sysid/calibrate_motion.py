@@ -13,9 +13,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.joint import joint_step
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.joint import joint_step
 from sysid.calibrate_record import BLOCK_S, STEP_S, Record
 from sysid.calibrate_search import Search
 

@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
 from envs.quiet_mujoco import mujoco
 from sysid.excite import joint_address
 from sysid.mechanism import JointDrive, Mechanism

@@ -15,9 +15,9 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from envs.hand.effects.command_quantization import quantized
-from envs.hand.effects.lowpass_cutoff import filtered
-from envs.hand.effects.slew_limit import limited
+from envs.actuator.effects.command_quantization import quantized
+from envs.actuator.effects.lowpass_cutoff import filtered
+from envs.actuator.effects.slew_limit import limited
 
 EFFECTS = (
     "transport_delay",

@@ -24,10 +24,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.hand.effects.base import EffectKind, Stage
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.surroundings import Gravity, Surroundings
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.effect import EffectKind, Stage
+from envs.actuator.surroundings import Gravity, Surroundings
 from sysid import diagnose_command as command
 from sysid import diagnose_link as link
 from sysid.diagnose_grid import SMOOTH_STEPS

@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, HandFile, JointQuantity, Quantity
 from sysid.diagnosis import Cause, Diagnosis, Estimate
 from sysid.mechanism import Mechanism, hand_mechanism

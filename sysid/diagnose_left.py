@@ -15,7 +15,7 @@ repeat than in the next is no news to the mechanics; the controller does not sti
 
 import numpy as np
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnose_model import gain_nat
 from sysid.diagnose_problem import CHANNELS, Problem
 from sysid.diagnose_search import EXCESS, Search

@@ -11,9 +11,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.joint import joint_step
-from envs.hand.effects.surroundings import Gravity, Surroundings
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.joint import joint_step
+from envs.actuator.surroundings import Gravity, Surroundings
 from sysid.diagnose_command import command_path
 from sysid.diagnose_forced import KINDS, Track
 from sysid.diagnose_problem import Problem

@@ -15,8 +15,8 @@ from dataclasses import replace
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from envs.hand.effects.base import EffectKind, Params, Stage
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.effect import EffectKind, Params, Stage
 from sysid.diagnose_command import WITHIN
 
 NAME = "torque_slope_limit"

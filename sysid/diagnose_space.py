@@ -17,8 +17,8 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.base import Parameter
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.effect import Parameter
 from sysid.diagnose_forced import joint_effects
 from sysid.diagnose_tracks import JointTrack
 from sysid.mechanism import Figure, JointDrive

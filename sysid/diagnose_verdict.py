@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnose_gain import residual_gains
 from sysid.diagnose_intervals import deviations
 from sysid.diagnose_left import left_over

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnose_search import Search
 
 

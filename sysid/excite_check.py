@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from envs.actuator.catalogue import effect_kind
+from envs.actuator.chain import chain_step, init_states
 from envs.errors import InputError
-from envs.hand.effects.catalogue import effect_kind
-from envs.hand.effects.chain import chain_step, init_states
 from envs.quiet_mujoco import mujoco
 from sysid.excite import Limits, Plan, joint_address, joint_range, make_plan
 from sysid.mechanism import Mechanism

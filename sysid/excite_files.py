@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from envs.actuator.catalogue import effect_kind
 from envs.config import dump_yaml
-from envs.hand.effects.catalogue import effect_kind
 from sysid.excite import Plan
 from sysid.excite_check import Rehearsal
 from sysid.excite_separate import NO_LIMIT, Separation

@@ -22,11 +22,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.base import EffectKind
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.joint import joint_step
-from envs.hand.effects.surroundings import Surroundings
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.effect import EffectKind
+from envs.actuator.joint import joint_step
+from envs.actuator.surroundings import Surroundings
 from sysid.excite import Plan
 from sysid.excite_check import STEP_S
 from sysid.mechanism import JointDrive, Mechanism

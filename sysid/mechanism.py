@@ -1,7 +1,7 @@
 """What was measured: joints with rigid-body model, drive and tolerances.
 
 A mechanism is the simulation as it stands: rigid bodies in MuJoCo, and for every joint
-the gains of its servo and the effects (of `envs.hand.effects`) that the simulation
+the gains of its servo and the effects (of `envs.actuator.effects`) that the simulation
 already has. Each figure has a tolerance within which it may differ without being news.
 """
 
@@ -10,9 +10,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
+from envs.actuator.catalogue import effect_kind
 from envs.config import load_yaml
 from envs.errors import InputError, one_of
-from envs.hand.effects.catalogue import effect_kind
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import build_spec

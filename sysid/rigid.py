@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.surroundings import Gravity, Surroundings
+from envs.actuator.surroundings import Gravity, Surroundings
 from envs.quiet_mujoco import mujoco
 from sysid.excite import joint_address
 from sysid.mechanism import Mechanism

@@ -18,8 +18,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float, Int
 
+from envs.actuator.effects.mount_tilt import tilted
 from envs.batch import BatchEnv
-from envs.hand.effects.mount_tilt import tilted
 from sysid.calibrate_search import Search
 from sysid.data import MeasuredLog
 from sysid.diagnosis import Diagnosis

@@ -7,7 +7,7 @@ from typing import Any
 import jax.numpy as jnp
 import numpy as np
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import Effect, HandFile, Quantity
 

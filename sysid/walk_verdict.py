@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis import Alternative, Cause, Estimate, Gain
 from sysid.walk_space import Axis, Hypothesis
 

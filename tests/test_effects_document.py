@@ -6,8 +6,8 @@ from pathlib import Path
 import yaml
 from support.effects_table import table
 
+from envs.actuator.effect import Stage
 from envs.config import from_dict, to_dict
-from envs.hand.effects.base import Stage
 from envs.hand.hand_file import HandFile, load_hand_file
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")

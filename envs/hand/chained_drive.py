@@ -12,11 +12,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.effect import EffectKind, Params, Substep
+from envs.actuator.surroundings import Surroundings
 from envs.hand.effect_scene import load_sensor
-from envs.hand.effects.base import EffectKind, Params, Substep
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.surroundings import Surroundings
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
 from envs.hand.places import joints_at

@@ -15,10 +15,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
+from envs.actuator.effects.lowpass_cutoff import filtered
+from envs.actuator.effects.slew_limit import limited
+from envs.actuator.effects.transport_delay import read_delayed
 from envs.errors import InputError
-from envs.hand.effects.lowpass_cutoff import filtered
-from envs.hand.effects.slew_limit import limited
-from envs.hand.effects.transport_delay import read_delayed
 from envs.hand.hand_file import HandFile
 
 MAX_DELAY_S = 0.04

@@ -2,8 +2,8 @@
 
 import mujoco
 
-from envs.hand.effects.base import EffectKind, Stage
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.effect import EffectKind, Stage
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile
 

@@ -18,9 +18,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from envs.actuator.catalogue import CATALOGUE
 from envs.config import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError, one_of
-from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.figures import Figures, figures
 from envs.hand.places import fingers_at, joints_at
 
@@ -96,7 +96,7 @@ class Effect:
     """What this hand does beside the figures above.
 
     Attributes:
-        name: of an effect in `envs.hand.effects.catalogue`.
+        name: of an effect in `envs.actuator.catalogue`.
         parameters: all its parameters.
         where: places that have it: `all`, `flexion`, `abduction`, `pip`, `dip`, fingers
             or joints by name. Effects of fingertips take fingers, effects of the whole

@@ -7,13 +7,13 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.effect import EffectKind, Params
+from envs.actuator.effects.floor_tilt import GRAVITY
+from envs.actuator.surroundings import Imu, Scene
 from envs.errors import InputError
 from envs.hand.chained_drive import joint_params
 from envs.hand.effect_scene import kinds_of, pair_name
-from envs.hand.effects.base import EffectKind, Params
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.floor_tilt import GRAVITY
-from envs.hand.effects.surroundings import Imu, Scene
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.places import fingers_at

@@ -6,8 +6,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from envs.actuator.catalogue import CATALOGUE
 from envs.crawl import CrawlConfig, CrawlEnv
-from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, Quantity, load_hand_file
 from envs.randomize import model_fields, no_randomization
 from envs.sensing import imu_of

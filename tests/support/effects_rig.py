@@ -6,10 +6,10 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step, init_states
-from envs.hand.effects.joint import joint_step
-from envs.hand.effects.surroundings import ALONE, Gravity, Surroundings
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step, init_states
+from envs.actuator.joint import joint_step
+from envs.actuator.surroundings import ALONE, Gravity, Surroundings
 
 DT = 1e-3
 KP, KD, INERTIA = 2.0, 0.05, 1e-3

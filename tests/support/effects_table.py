@@ -5,7 +5,7 @@
 
 import math
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 
 
 def table():

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from envs.hand.effects.catalogue import CATALOGUE
+from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from sysid.diagnose_forced import joint_effects
 from sysid.diagnose_hand import extended_hand

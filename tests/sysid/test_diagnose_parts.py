@@ -9,8 +9,8 @@ from scipy.signal import lfilter
 
 from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import draw_case
+from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
-from envs.hand.effects.catalogue import CATALOGUE
 from envs.quiet_mujoco import mujoco
 from sysid.data import make_log
 from sysid.diagnose import diagnose, problem_of

@@ -15,8 +15,8 @@ from benchmarks.diagnosis.hidden.recording import Recording, standard
 from benchmarks.diagnosis.hidden.sampling import Noise, exact, record
 from benchmarks.diagnosis.hidden.simulate import simulate
 from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
-from envs.hand.effects.catalogue import CATALOGUE
-from envs.hand.effects.chain import chain_step
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import chain_step
 
 FOLDER = Path(__file__).parents[1] / "hidden"
 WEIGHT = Link(
@@ -48,7 +48,7 @@ def held(mechanism, target, seconds=1.0, start=0.0):
 
 
 def test_nothing_is_shared_with_what_is_tested():
-    forbidden = ("envs.hand.effects", "envs.hand.drive", "sysid.")
+    forbidden = ("envs.actuator.effects", "envs.hand.drive", "sysid.")
     for file in FOLDER.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []

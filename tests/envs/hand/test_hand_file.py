@@ -5,10 +5,10 @@ import random
 import numpy as np
 import pytest
 
+from envs.actuator.catalogue import CATALOGUE
 from envs.config import dump_yaml, from_dict, override, to_dict
 from envs.errors import InputError
 from envs.hand import hand_file
-from envs.hand.effects.catalogue import CATALOGUE
 from envs.hand.figures import figures
 from envs.hand.hand_file import (
     DEFAULT_HAND_FILE,

@@ -1,0 +1,129 @@
+"""One substep of a position-controlled joint with any tuple of effects."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import jax.numpy as jnp
+from jaxtyping import Array, ArrayLike, Float
+
+from envs.actuator.effect import EffectKind, Params, Stage, Substep
+from envs.actuator.surroundings import ALONE, Surroundings
+from envs.errors import InputError
+
+Model = Sequence[tuple[EffectKind, Params]]
+"""Effects with their parameters; those of one stage act in this order."""
+
+
+def init_states(
+    model: Model, target: Float[Array, "*j"], q: Float[Array, "*j"], dt: float
+) -> tuple[Any, ...]:
+    """Returns the states of all effects at rest: nothing has changed for long.
+
+    Args:
+        model: effects with their parameters.
+        target: target that was sent [rad].
+        q: angle at which the joint rests [rad].
+        dt: substep [s].
+    """
+    return tuple(kind.init(params, target, q, dt) for kind, params in model)
+
+
+def chain_step(
+    model: Model,
+    states: tuple[Any, ...],
+    target: Float[Array, "*j"],
+    q: Float[Array, "*j"],
+    qd: Float[Array, "*j"],
+    load: Float[ArrayLike, "*j"],
+    kp: Float[ArrayLike, "*j"],
+    kd: Float[ArrayLike, "*j"],
+    dt: float,
+    around: Surroundings = ALONE,
+) -> tuple[tuple[Any, ...], Substep]:
+    """Runs one substep: target → command → servo → transmission → friction → reading.
+
+        e = c − y,   τ = kp e − kd ẏ
+
+    with command c and encoder y; effects change the signals where they act. Without
+    effects this is the plain servo.
+
+    Args:
+        model: effects with their parameters.
+        states: their states after the previous substep.
+        target: target of this substep [rad].
+        q: joint angle [rad].
+        qd: joint speed [rad/s].
+        load: torque of everything but the drive on the joint [N·m].
+        kp: nominal position gain [N·m/rad].
+        kd: nominal velocity gain [N·m·s/rad].
+        dt: substep [s].
+        around: what the rest of the hand does, for effects that need it.
+
+    Returns:
+        The new states, and the signals: torques, friction, damping and inertia go to
+        the physics (see `effects.joint`), effort and reading to the observer.
+
+    Raises:
+        InputError: an effect needs surroundings that are not given.
+    """
+    _check_surroundings(model, around)
+    kp, kd, load = (jnp.broadcast_to(x, jnp.shape(q)) for x in (kp, kd, load))
+    none = jnp.zeros_like(q)
+    x = Substep(
+        command=target,
+        q=q,
+        qd=qd,
+        encoder=q,
+        encoder_speed=qd,
+        error=none,
+        kp=kp,
+        kd=kd,
+        effort=none,
+        follows=jnp.ones_like(none),
+        torque=none,
+        damping=none,
+        passive=none,
+        load=load,
+        friction=none,
+        viscous=none,
+        inertia=none,
+        reading=none,
+        around=around,
+    )
+    for stage in Stage:
+        x = _servo(stage, x)
+        states, x = _act(model, states, stage, x, dt)
+    return states, x
+
+
+def _servo(stage: Stage, x: Substep) -> Substep:
+    """What happens without effects just before those of a stage act."""
+    if stage is Stage.ERROR:
+        return x.replace(error=x.command - x.encoder)
+    if stage is Stage.TORQUE:
+        return x.replace(torque=x.kp * x.error - x.kd * x.encoder_speed)
+    if stage is Stage.TRANSMISSION:
+        return x.replace(effort=x.torque, damping=x.follows * x.kd)
+    if stage is Stage.READING:
+        return x.replace(reading=x.encoder)
+    return x
+
+
+def _act(
+    model: Model, states: tuple[Any, ...], stage: Stage, x: Substep, dt: float
+) -> tuple[tuple[Any, ...], Substep]:
+    """Lets the effects of one stage act in order."""
+    after = []
+    for (kind, params), state in zip(model, states, strict=True):
+        if (act := kind.acts.get(stage)) is not None:
+            state, x = act(params, state, x, dt)
+        after.append(state)
+    return tuple(after), x
+
+
+def _check_surroundings(model: Model, around: Surroundings) -> None:
+    for kind, _ in model:
+        for name in kind.needs:
+            if getattr(around, name) is None:
+                valid = "an effect whose surroundings are given"
+                raise InputError("effect", f"{kind.name}.{name}", "nothing", valid)

@@ -1,0 +1,42 @@
+"""Largest speed of the command."""
+
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
+
+
+def limited(
+    last: Float[Array, "*j"],
+    command: Float[Array, "*j"],
+    speed_rad_s: Float[Array, "*j"],
+    dt: float | Float[Array, "*j"],
+) -> Float[Array, "*j"]:
+    """Moves towards the command by at most v_max Δt."""
+    reach = speed_rad_s * dt
+    return jnp.clip(command, last - reach, last + reach)
+
+
+def _act(params: Params, last, x, dt):
+    command = limited(last, x.command, params["speed_rad_s"], dt)
+    return command, x.replace(command=command)
+
+
+EFFECT = EffectKind(
+    name="slew_limit",
+    equation="|ċ| ≤ v_max",
+    parameters={
+        "speed_rad_s": Parameter(
+            "rad/s", 0.05, 50.0, lognormal(3.0, 2.0), identity=float("inf")
+        )
+    },
+    acts={Stage.COMMAND: _act},
+    confusable_with={
+        "lowpass_cutoff": "steps of two sizes: the slope of a limit stays the same",
+        "torque_limit": "effort: flat at a torque limit, small at a speed limit",
+        "viscous_friction": "effort at constant speed: friction needs it, a limit not",
+        "transport_delay": "steps of two sizes: the lag of a limit grows with the size",
+    },
+    source="Paper, Table I (filtered joint speed 2.8 and 2.5 rad/s)",
+    init=lambda params, target, q, dt: target,
+)
