@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import dataclass, field
 
-from envs.config import load_yaml
+from envs.config.typed import load_yaml
 from envs.errors import InputError
 from envs.hand.custom_figures import import_hand
 from envs.hand.hand_file import HandFile, hand_yaml

@@ -2,7 +2,7 @@
 
 import argparse
 
-from envs.config import load_yaml
+from envs.config.typed import load_yaml
 from sysid.data_bag import BagMap
 from sysid.data_info import info_lines
 from sysid.data_read import read_log

@@ -2,7 +2,7 @@
 
 import argparse
 
-from envs.config import load_yaml
+from envs.config.typed import load_yaml
 from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli_sysid_excite import mechanism_of
 from sysid.calibrate import Calibration, calibrate, calibrated_hand

@@ -4,7 +4,7 @@ import dataclasses
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from envs.config import to_dict
+from envs.config.typed import to_dict
 from envs.errors import InputError, one_of
 
 POSITIVE = 1e-9

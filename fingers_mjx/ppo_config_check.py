@@ -1,6 +1,6 @@
 """Checks that the settings of a run fit together, before anything is compiled."""
 
-from envs.config import from_dict, to_dict
+from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from fingers_mjx.ppo_config import TrainConfig
 

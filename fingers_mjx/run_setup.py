@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from envs.batch import BatchEnv
-from envs.config import load_yaml, override
+from envs.config.typed import load_yaml, override
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.registry import get_task, make_batch

@@ -20,7 +20,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any, TypeVar
 
-from envs.config import dump_yaml, load_yaml
+from envs.config.typed import dump_yaml, load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, hand_yaml
 from fingers_mjx.rundir_files import write_whole

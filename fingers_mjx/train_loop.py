@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from envs.config import to_dict
+from envs.config.typed import to_dict
 from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog

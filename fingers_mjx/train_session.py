@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State
-from envs.config import to_dict
+from envs.config.typed import to_dict
 from fingers_mjx.ppo import Iteration, make_iteration, repeat_iterations
 from fingers_mjx.ppo_config import TrainConfig, bound_fields
 from fingers_mjx.ppo_rollout import FAULTS, BatchEnv

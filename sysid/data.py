@@ -17,7 +17,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
-from envs.config import to_dict
+from envs.config.typed import to_dict
 from envs.errors import InputError, one_of
 from sysid.data_columns import (
     QUANTITIES,

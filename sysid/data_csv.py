@@ -18,8 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
-from envs.config import dump_yaml, from_dict, load_yaml
-from envs.config_yaml import parse_yaml
+from envs.config.strict_yaml import parse_yaml
+from envs.config.typed import dump_yaml, from_dict, load_yaml
 from envs.errors import InputError
 from sysid.data import LogHeader, MeasuredLog
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from envs.config import from_dict, to_dict
+from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from sysid.data import LogHeader, MeasuredLog
 

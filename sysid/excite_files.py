@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from envs.actuator.catalogue import effect_kind
-from envs.config import dump_yaml
+from envs.config.typed import dump_yaml
 from sysid.excite import Plan
 from sysid.excite_check import Rehearsal
 from sysid.excite_separate import NO_LIMIT, Separation

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from envs.actuator.catalogue import effect_kind
-from envs.config import load_yaml
+from envs.config.typed import load_yaml
 from envs.errors import InputError, one_of
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile, load_hand_file

@@ -7,7 +7,7 @@ import yaml
 from support.effects_table import table
 
 from envs.actuator.effect import Stage
-from envs.config import from_dict, to_dict
+from envs.config.typed import from_dict, to_dict
 from envs.hand.hand_file import HandFile, load_hand_file
 
 TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from support import cli_setup
 
-from envs.config import dump_yaml, load_yaml, to_dict
+from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.crawl import CrawlConfig
 from envs.errors import InputError
 from envs.hand.custom import load_custom_hand

@@ -13,7 +13,7 @@ import pytest
 from support import train_setup
 from support.cli_setup import make_bundle, make_setup
 
-from envs.config import load_yaml
+from envs.config.typed import load_yaml
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy import load_bundle
 from fingers_mjx import checkpoint

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from envs.config import from_dict
+from envs.config.typed import from_dict
 from envs.errors import InputError
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")

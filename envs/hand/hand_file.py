@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.config import dump_yaml, load_yaml, to_dict
+from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError, one_of
 from envs.hand.figures import Figures, figures
 from envs.hand.places import fingers_at, joints_at

@@ -6,7 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.config import from_dict, override, to_dict
+from envs.config.typed import from_dict, override, to_dict
 from envs.crawl import Crawl, CrawlConfig, CrawlEnv
 from envs.errors import InputError
 from envs.scoring import scheduled_weights

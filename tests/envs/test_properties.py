@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from support.properties import counts, holds
 
-from envs.config import dump_yaml, from_dict, load_yaml, override, to_dict
+from envs.config.typed import dump_yaml, from_dict, load_yaml, override, to_dict
 from envs.crawl import CrawlConfig, CrawlEnv
 from envs.hand.figures import figures
 from envs.hand.hand_file import (

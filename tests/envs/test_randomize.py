@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.config import override
+from envs.config.typed import override
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.spec import hand_spec

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.config import from_dict, to_dict
+from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from envs.config import from_dict, to_dict
+from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from fingers_mjx.ppo_config import PRESETS, TrainConfig, bound_fields, paper, preset
 from fingers_mjx.ppo_config_check import check_config

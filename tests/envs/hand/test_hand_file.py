@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.config import dump_yaml, from_dict, override, to_dict
+from envs.config.typed import dump_yaml, from_dict, override, to_dict
 from envs.errors import InputError
 from envs.hand import hand_file
 from envs.hand.figures import figures

@@ -2,7 +2,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.config import override
+from envs.config.typed import override
 from envs.hand.figures import FINGERS, figures, kinematics_checks
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, build_model, build_spec

@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.config import override
+from envs.config.typed import override
 from envs.errors import InputError
 from envs.hand import stance as stance_module
 from envs.hand.figures import FINGERS

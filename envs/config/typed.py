@@ -2,7 +2,7 @@
 
 Every mistake raises `InputError` naming the dotted field, what was found and what fits.
 A field may carry metadata: `unit`, `low` and `high` (inclusive, for every number in
-it), `doc`. YAML is read strictly, see `envs.config_yaml`.
+it), `doc`. YAML is read strictly, see `envs.config.strict_yaml`.
 """
 
 import dataclasses
@@ -10,8 +10,8 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from envs.config_parse import Place, init_fields, parse
-from envs.config_yaml import parse_yaml, write_yaml
+from envs.config.parse import Place, init_fields, parse
+from envs.config.strict_yaml import parse_yaml, write_yaml
 from envs.errors import InputError, one_of
 
 T = TypeVar("T")

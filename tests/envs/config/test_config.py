@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given, seed, settings
 from hypothesis import strategies as st
 
-from envs.config import dump_yaml, from_dict, load_yaml, override, to_dict
+from envs.config.typed import dump_yaml, from_dict, load_yaml, override, to_dict
 from envs.errors import InputError
 
 SEED = 20260101
