@@ -9,7 +9,7 @@ import mujoco
 from jaxtyping import Array, Bool, Float
 
 from envs.base import State
-from envs.hand.effect_scene import friction_rows
+from envs.hand.effect_parts import friction_rows
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec

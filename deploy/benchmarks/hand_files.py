@@ -15,6 +15,7 @@ import fingers_mjx
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import load_stance
+from envs.hand.standing_mjcf import standing_mjcf
 from envs.registry import make_batch
 from fingers_deploy.bundle import Bundle
 from fingers_deploy.manifest import (
@@ -27,7 +28,6 @@ from fingers_deploy.manifest import (
     Term,
 )
 from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.hand_mjcf import standing_mjcf
 from fingers_mjx.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
 

@@ -16,7 +16,7 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states
 from envs.actuator.effect import EffectKind, Params, Substep
 from envs.actuator.surroundings import Surroundings
-from envs.hand.effect_scene import load_sensor
+from envs.hand.effect_parts import load_sensor
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
 from envs.hand.places import joints_at

@@ -10,7 +10,7 @@ the hand file.
 
 import numpy as np
 
-from envs.hand.effect_scene import add_effect_parts
+from envs.hand.effect_parts import add_effect_parts
 from envs.hand.figures import FINGERS, Link
 from envs.hand.hand_file import HandFile
 from envs.quiet_mujoco import mujoco
