@@ -5,8 +5,8 @@ from typing import Any
 import flax.struct
 from jaxtyping import Array, Float, Int
 
-from envs.hand.chained_drive import ChainState
-from envs.hand.drive import DriveState
+from envs.hand.drive.chain import ChainState
+from envs.hand.drive.servo import DriveState
 from envs.observations import Sample
 from envs.randomize import Variation
 from rewards import Schedule

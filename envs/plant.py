@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from envs.errors import InputError
-from envs.hand.chained_drive import (
+from envs.hand.drive.chain import (
     Chain,
     ChainState,
     begin_chain,
@@ -20,7 +20,8 @@ from envs.hand.chained_drive import (
     make_chain,
     read_load,
 )
-from envs.hand.drive import (
+from envs.hand.drive.model_effects import SceneEffects, make_scene_effects
+from envs.hand.drive.servo import (
     DriveParams,
     DriveState,
     command_sequence,
@@ -29,7 +30,6 @@ from envs.hand.drive import (
 )
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.scene_effects import SceneEffects, make_scene_effects
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, HandSpec, hand_spec
 from envs.hand.stance import Stance
 from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState

@@ -20,8 +20,8 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.batch import BatchEnv
-from envs.hand.chained_drive import ChainState
-from envs.hand.drive import DriveState
+from envs.hand.drive.chain import ChainState
+from envs.hand.drive.servo import DriveState
 from envs.hand.figures import figures
 from envs.memory import Lasting, Memory
 from envs.observations import Sample

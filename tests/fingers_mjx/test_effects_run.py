@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from support.cli_setup import make_bundle, make_setup
 
-from envs.hand.chained_drive import ChainState
+from envs.hand.drive.chain import ChainState
 from fingers_deploy import load_bundle
 from fingers_mjx.play import Player
 from fingers_mjx.run_setup import make_env

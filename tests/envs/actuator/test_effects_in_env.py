@@ -10,8 +10,8 @@ import pytest
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
-from envs.hand.chained_drive import ChainState, in_chain, make_chain
-from envs.hand.drive import DriveState
+from envs.hand.drive.chain import ChainState, in_chain, make_chain
+from envs.hand.drive.servo import DriveState
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S, build_spec
 from envs.hand.stance import load_stance, stance_of

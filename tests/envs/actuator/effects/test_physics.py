@@ -9,7 +9,7 @@ import pytest
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states
 from envs.actuator.effect import lognormal, normal
-from envs.hand.drive import MAX_DELAY_S, DriveParams, drive_step, init_drive_state
+from envs.hand.drive.servo import MAX_DELAY_S, DriveParams, drive_step, init_drive_state
 
 INF = np.inf
 RAMP = np.linspace(0.0, 0.5, 200)

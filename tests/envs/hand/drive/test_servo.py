@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.hand.drive import (
+from envs.hand.drive.servo import (
     DriveParams,
     command_sequence,
     command_step,

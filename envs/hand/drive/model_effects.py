@@ -12,7 +12,7 @@ from envs.actuator.effect import EffectKind, Params
 from envs.actuator.effects.floor_tilt import GRAVITY
 from envs.actuator.surroundings import Imu, Scene
 from envs.errors import InputError
-from envs.hand.chained_drive import joint_params
+from envs.hand.drive.chain import joint_params
 from envs.hand.effect_parts import kinds_of, pair_name
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile

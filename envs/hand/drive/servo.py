@@ -5,7 +5,7 @@ position servo with torque limit. The stages are in series, each with a state of
 own: the firmware filter does not know that the motor saturates behind it. The speed
 limit comes after the filter because the paper measures the speed of the *filtered*
 response (2.8 and 2.5 rad/s ramps), which bounds what the servo follows. The formulas
-are those of the effects of these names; `envs.hand.chained_drive` runs all effects.
+are those of the effects of these names; `envs.hand.drive.chain` runs all effects.
 """
 
 import math

@@ -1,0 +1,1 @@
+"""How the joints of the simulated hand are driven."""
