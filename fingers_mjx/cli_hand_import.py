@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 
 from envs.config.typed import load_yaml
 from envs.errors import InputError
-from envs.hand.custom_figures import import_hand
 from envs.hand.hand_file import HandFile, hand_yaml
+from envs.hand.importing.figures import import_hand
 from envs.hand.stance import stance_of
 from fingers_mjx.cli_paths import check_file
 from fingers_mjx.evaluate_files import write_atomic

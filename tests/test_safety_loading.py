@@ -16,8 +16,8 @@ from support import cli_setup
 from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.crawl import CrawlConfig
 from envs.errors import InputError
-from envs.hand.custom import load_custom_hand
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
+from envs.hand.importing.load import load_custom_hand
 from envs.hand.model import build_spec
 from fingers_deploy import BundleError, load_bundle
 from fingers_mjx import checkpoint

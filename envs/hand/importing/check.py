@@ -5,8 +5,8 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.custom_place import Placed
 from envs.hand.hand_file import HandFile
+from envs.hand.importing.place import Placed
 from envs.hand.model import PALM, build_model
 from envs.hand.spec import TIP_SITES
 

@@ -7,7 +7,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.custom_palm import Frame
+from envs.hand.importing.palm import Frame
 from envs.hand.model import PAYLOAD
 
 PALM_GROUP, PAYLOAD_GROUP = 20, 21

@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.hand.custom_palm import Frame
-from envs.hand.custom_shape import colliding_geoms, link_capsule
+from envs.hand.importing.palm import Frame
+from envs.hand.importing.shape import colliding_geoms, link_capsule
 
 # All with the bounds of a capsule from 6 to 34 mm along z, 6 mm thick.
 SHAPES = {

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from envs.hand.custom import CustomHand
-from envs.hand.custom_inertia import groups
-from envs.hand.custom_palm import Frame, link_frames, palm_frame
+from envs.hand.importing.inertia import groups
+from envs.hand.importing.load import CustomHand
+from envs.hand.importing.palm import Frame, link_frames, palm_frame
 from envs.quiet_mujoco import mujoco
 
 

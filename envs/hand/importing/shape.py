@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from envs.hand.custom_palm import Frame
 from envs.hand.figures import Capsule
+from envs.hand.importing.palm import Frame
 
 _GEOM = mujoco.mjtGeom
 _SHORTEST_M = 0.001

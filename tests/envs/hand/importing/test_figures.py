@@ -9,13 +9,13 @@ import pytest
 
 from envs.crawl import CrawlEnv
 from envs.errors import InputError
-from envs.hand.custom import load_custom_hand
-from envs.hand.custom_check import TIP_ERROR_M, check_same, tip_error_m
-from envs.hand.custom_figures import import_hand
-from envs.hand.custom_palm import Frame, rotation
-from envs.hand.custom_place import place
 from envs.hand.figures import NAMES, figures
 from envs.hand.hand_file import JointQuantity, hand_yaml, load_hand_file
+from envs.hand.importing.check import TIP_ERROR_M, check_same, tip_error_m
+from envs.hand.importing.figures import import_hand
+from envs.hand.importing.load import load_custom_hand
+from envs.hand.importing.palm import Frame, rotation
+from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
 from envs.keyboard import KeyboardEnv

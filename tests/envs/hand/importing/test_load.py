@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.hand.custom import load_custom_hand
 from envs.hand.figures import figures
+from envs.hand.importing.load import load_custom_hand
 
 SEED = 20260104
 JOINTS = figures().joint_names

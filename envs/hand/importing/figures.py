@@ -16,23 +16,6 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.custom import load_custom_hand
-from envs.hand.custom_check import check_same
-from envs.hand.custom_drive import Drive, drive_of
-from envs.hand.custom_inertia import (
-    PALM_GROUP,
-    PAYLOAD_GROUP,
-    Inertia,
-    inertia_of,
-)
-from envs.hand.custom_palm import Frame
-from envs.hand.custom_place import Placed, place
-from envs.hand.custom_shape import (
-    bounds,
-    colliding_geoms,
-    link_capsule,
-    surface_points,
-)
 from envs.hand.figures import NAMES, Capsule, Figures, Link, Palm, figures
 from envs.hand.hand_file import (
     HandFile,
@@ -40,6 +23,23 @@ from envs.hand.hand_file import (
     Quantity,
     Vector,
     load_hand_file,
+)
+from envs.hand.importing.check import check_same
+from envs.hand.importing.drive import Drive, drive_of
+from envs.hand.importing.inertia import (
+    PALM_GROUP,
+    PAYLOAD_GROUP,
+    Inertia,
+    inertia_of,
+)
+from envs.hand.importing.load import load_custom_hand
+from envs.hand.importing.palm import Frame
+from envs.hand.importing.place import Placed, place
+from envs.hand.importing.shape import (
+    bounds,
+    colliding_geoms,
+    link_capsule,
+    surface_points,
 )
 
 COMPILE_CPU_S = 60

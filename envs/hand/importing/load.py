@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from envs.errors import InputError, one_of
-from envs.hand.custom_files import TIMESTEP_S, check_files
 from envs.hand.figures import FINGERS, figures
+from envs.hand.importing.files import TIMESTEP_S, check_files
 from envs.quiet_mujoco import mujoco
 
 _CHILD = Path(__file__).with_name("custom_child.py")

@@ -1,0 +1,1 @@
+"""A hand of the user's own: from an MJCF file to a hand file and a model."""
