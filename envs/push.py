@@ -20,7 +20,6 @@ from envs.camera import (
 )
 from envs.env import HandEnv
 from envs.errors import check_ordered
-from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.memory import Lasting, Memory
@@ -35,9 +34,10 @@ from envs.rotations import multiply, rotate, unrotate
 from envs.scoring import check_weights
 from envs.settings import HandSettings
 from envs.signals import Signals
-from envs.start import near_stance
 from envs.streams import stream
 from envs.task import BareTask
+from envs.tasks.gait import fallen, step_gait
+from envs.tasks.start import near_stance
 from rewards import (
     PUSH,
     RewardTable,

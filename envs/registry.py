@@ -5,11 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from envs.batch import BatchEnv, Env
-from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError, one_of
 from envs.keyboard import KeyboardConfig, KeyboardEnv
 from envs.push import PushConfig, PushEnv
 from envs.recovery import RecoveryConfig, RecoveryEnv
+from envs.tasks.crawl import CrawlConfig, CrawlEnv
 
 
 @dataclass(frozen=True)

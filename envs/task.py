@@ -18,7 +18,7 @@ from rewards import RewardTable
 
 
 class HandConfig(Protocol):
-    """The settings that every task has; for their meaning see `envs.crawl`."""
+    """The settings that every task has; for their meaning see `envs.tasks.crawl`."""
 
     @property
     def episode_s(self) -> float:

@@ -14,11 +14,11 @@ import pytest
 from support import cli_setup
 
 from envs.config.typed import dump_yaml, load_yaml, to_dict
-from envs.crawl import CrawlConfig
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from envs.hand.importing.load import load_custom_hand
 from envs.hand.model import build_spec
+from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import BundleError, load_bundle
 from fingers_mjx import checkpoint
 from fingers_mjx.evaluate_files import read_table, write_table

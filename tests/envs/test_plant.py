@@ -5,11 +5,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError
 from envs.physics import PhysicsOutput
 from envs.physics.room import ROOM
 from envs.plant import check_interval
+from envs.tasks.crawl import CrawlConfig, CrawlEnv
 
 
 class TooSmall:

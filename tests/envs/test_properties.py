@@ -12,7 +12,6 @@ from hypothesis.extra.numpy import arrays
 from support.properties import counts, holds
 
 from envs.config.typed import dump_yaml, from_dict, load_yaml, override, to_dict
-from envs.crawl import CrawlConfig, CrawlEnv
 from envs.hand.figures import figures
 from envs.hand.hand_file import (
     HandFile,
@@ -21,6 +20,7 @@ from envs.hand.hand_file import (
     save_hand_file,
 )
 from envs.randomize import RandomizeConfig
+from envs.tasks.crawl import CrawlConfig, CrawlEnv
 
 ENV = CrawlEnv()
 HAND = load_hand_file()

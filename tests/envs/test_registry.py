@@ -1,9 +1,9 @@
 import pytest
 
 from envs import registry
-from envs.crawl import CrawlConfig, CrawlEnv
 from envs.errors import InputError
 from envs.registry import Task, get_task, make_batch, register, task_names
+from envs.tasks.crawl import CrawlConfig, CrawlEnv
 
 
 def test_unknown_task_is_named_with_the_nearest():

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from envs.commands import CommandConfig
-from envs.crawl import Crawl, CrawlConfig
 from envs.env import HandEnv
 from envs.errors import InputError
 from envs.hand.figures import figures
@@ -19,6 +18,7 @@ from envs.hand.model import build_spec
 from envs.hand.spec import HAND_NQ, HAND_NV, hand_spec
 from envs.hand.stance import load_stance
 from envs.scene import build_scene
+from envs.tasks.crawl import Crawl, CrawlConfig
 
 HAND, Q_OFF = load_hand_file(), load_stance().q_off
 

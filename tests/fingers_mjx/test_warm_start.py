@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import fingers_mjx
-from envs.crawl import CrawlConfig
 from envs.errors import InputError
 from envs.registry import make_batch
+from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import load_bundle
 from fingers_mjx.ppo_config import PpoConfig
 from fingers_mjx.ppo_state import init_train_state, make_learner, train_template

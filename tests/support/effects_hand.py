@@ -7,10 +7,10 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.crawl import CrawlConfig, CrawlEnv
 from envs.hand.hand_file import Effect, Quantity, load_hand_file
 from envs.randomize import model_fields, no_randomization
 from envs.sensing import imu_of
+from envs.tasks.crawl import CrawlConfig, CrawlEnv
 
 CALM = CrawlConfig(randomize=no_randomization(0.88))
 IN_HAND = tuple(name for name in CATALOGUE if name != "mount_tilt")

@@ -11,8 +11,8 @@ from envs.commands import CommandConfig
 from envs.env import HandEnv
 from envs.registry import Task, register
 from envs.settings import HandSettings
-from envs.start import near_stance
 from envs.task import BareTask
+from envs.tasks.start import near_stance
 from rewards import RewardTerm, action_rate, stance_height
 
 CROUCH = (

@@ -148,7 +148,7 @@ def test_effects_that_this_hand_cannot_have_are_refused():
             hand, payload_mass=dataclasses.replace(hand.payload_mass, value=0.05)
         )
         with pytest.raises(InputError, match=field):
-            from envs.crawl import CrawlEnv
+            from envs.tasks.crawl import CrawlEnv
 
             CrawlEnv(rig.CALM, hand=light, stance=load_stance())
 

@@ -7,7 +7,6 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.crawl import CrawlEnv
 from envs.errors import InputError
 from envs.hand.figures import NAMES, figures
 from envs.hand.hand_file import JointQuantity, hand_yaml, load_hand_file
@@ -19,6 +18,7 @@ from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
 from envs.keyboard import KeyboardEnv
+from envs.tasks.crawl import CrawlEnv
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)

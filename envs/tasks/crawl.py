@@ -10,7 +10,6 @@ from jaxtyping import Array, Bool, Float
 from envs.commands import CommandConfig, sample_command
 from envs.env import HandEnv
 from envs.errors import InputError
-from envs.gait import fallen, step_gait
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Lasting, Memory
@@ -19,9 +18,10 @@ from envs.plant import Plant, check_interval
 from envs.randomize import RandomizeConfig
 from envs.scoring import check_weights
 from envs.signals import Signals
-from envs.start import near_stance
 from envs.streams import stream
 from envs.task import BareTask
+from envs.tasks.gait import fallen, step_gait
+from envs.tasks.start import near_stance
 from rewards import (
     CRAWL,
     RewardTable,

@@ -2,9 +2,9 @@ import jax
 import numpy as np
 import pytest
 
-from envs.crawl import CrawlEnv
 from envs.signals import tilt
-from envs.start import near_stance
+from envs.tasks.crawl import CrawlEnv
+from envs.tasks.start import near_stance
 
 
 @pytest.fixture(scope="module")

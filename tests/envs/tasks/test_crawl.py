@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from envs.config.typed import from_dict, override, to_dict
-from envs.crawl import Crawl, CrawlConfig, CrawlEnv
 from envs.errors import InputError
 from envs.scoring import scheduled_weights
+from envs.tasks.crawl import Crawl, CrawlConfig, CrawlEnv
 from rewards import CRAWL
 
 TERMS = {row.name for row in CRAWL}

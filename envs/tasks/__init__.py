@@ -1,0 +1,1 @@
+"""The tasks: crawl, keyboard, push, recovery."""
