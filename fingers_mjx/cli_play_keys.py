@@ -3,7 +3,7 @@
 import argparse
 
 from envs.errors import InputError, one_of
-from envs.keyboard import KeyboardConfig
+from envs.tasks.keyboard.task import KeyboardConfig
 from fingers_deploy import Bundle
 from fingers_mjx.play_keyboard import TASK
 from fingers_mjx.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, Board, read_level

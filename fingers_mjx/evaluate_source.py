@@ -11,10 +11,10 @@ from matplotlib.figure import Figure
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
-from envs.keyboard import KeyboardConfig
-from envs.keyboard_variation import nominal_keyboard
 from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
+from envs.tasks.keyboard.task import KeyboardConfig
+from envs.tasks.keyboard.variation import nominal_keyboard
 from fingers_mjx import figures
 from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
 from fingers_mjx.evaluate_files import (

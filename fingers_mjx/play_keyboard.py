@@ -13,10 +13,10 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.batch import BatchEnv
-from envs.keyboard_model import KEY_NAMES
-from envs.keyboard_requests import IDLE
 from envs.memory import Memory
 from envs.physics import PhysicsState
+from envs.tasks.keyboard.model import KEY_NAMES
+from envs.tasks.keyboard.requests import IDLE
 from fingers_deploy import Bundle
 from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.policy import Runtime

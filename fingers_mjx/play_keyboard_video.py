@@ -6,7 +6,7 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from envs.keyboard_model import ARROWS, KEY_NAMES
+from envs.tasks.keyboard.model import ARROWS, KEY_NAMES
 from fingers_mjx.play import Played
 from fingers_mjx.play_keyboard import boards_of
 from fingers_mjx.play_video import frame_steps

@@ -1,7 +1,7 @@
 """Reward table of keyboard pressing.
 
 The rows bind attributes of `envs.signals.Signals` and the task's own signals, see
-`envs.keyboard.Keyboard.scene_signals`. The paper names the goals and penalties and
+`envs.tasks.keyboard.task.Keyboard.scene_signals`. The paper names the goals and penalties and
 gives no weight; all weights are ours. Rows of single events (`hit`, `wrong`, `stray`,
 `stance_lost`) are paid once: at an interval of 20 ms a weight of 250 is 5 per event.
 

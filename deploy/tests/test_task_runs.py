@@ -3,7 +3,7 @@
 import pytest
 from task_runs import get_up, push_cube, type_keys
 
-from envs.keyboard_model import ARROWS
+from envs.tasks.keyboard.model import ARROWS
 
 
 @pytest.fixture(scope="module")

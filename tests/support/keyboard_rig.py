@@ -12,9 +12,9 @@ import numpy as np
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HAND_NQ, TIP_LINKS
-from envs.keyboard import KeyboardConfig
-from envs.keyboard_fingertip import JOINTS
-from envs.keyboard_model import (
+from envs.scene import build_scene
+from envs.tasks.keyboard.fingertip import JOINTS
+from envs.tasks.keyboard.model import (
     ACTUATION_M,
     ARROWS,
     KEY_CENTRES_M,
@@ -23,8 +23,8 @@ from envs.keyboard_model import (
     add_keyboard,
     free_fingertip,
 )
-from envs.keyboard_stance import FINGER, FINGER_INDEX, PLACEMENT, keyboard_stance
-from envs.scene import build_scene
+from envs.tasks.keyboard.stance import FINGER, FINGER_INDEX, PLACEMENT, keyboard_stance
+from envs.tasks.keyboard.task import KeyboardConfig
 from fingers_robot.simulator.command_path import CommandPath
 
 TIP_RADIUS_M, LIFT_M = 0.0075, 0.010

@@ -17,8 +17,8 @@ from envs.hand.importing.palm import Frame, rotation
 from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
-from envs.keyboard import KeyboardEnv
 from envs.tasks.crawl import CrawlEnv
+from envs.tasks.keyboard.task import KeyboardEnv
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)

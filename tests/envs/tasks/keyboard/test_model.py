@@ -8,8 +8,8 @@ from support.keyboard_rig import Rig
 
 from envs.hand.figures import figures
 from envs.hand.spec import HAND_NQ
-from envs.keyboard_fingertip import fingertip_v
-from envs.keyboard_model import (
+from envs.tasks.keyboard.fingertip import fingertip_v
+from envs.tasks.keyboard.model import (
     ACTUATION_M,
     ARROWS,
     FORCE_N,
@@ -21,7 +21,7 @@ from envs.keyboard_model import (
     key_events,
     key_spring,
 )
-from envs.keyboard_stance import PLACEMENT, SUPPORTS
+from envs.tasks.keyboard.stance import PLACEMENT, SUPPORTS
 
 
 def events(depths_mm, actuation_m=ACTUATION_M):

@@ -13,7 +13,7 @@ import numpy as np
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance, load_stance, stance_of
-from envs.keyboard_model import Placement
+from envs.tasks.keyboard.model import Placement
 
 FINGER = "middle"
 FINGER_INDEX = FINGERS.index(FINGER)

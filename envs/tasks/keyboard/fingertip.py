@@ -5,8 +5,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.hand.figures import figures
-from envs.keyboard_stance import FINGER_INDEX
 from envs.rotations import multiply, rotate, unrotate
+from envs.tasks.keyboard.stance import FINGER_INDEX
 
 JOINTS = slice(4 * FINGER_INDEX, 4 * FINGER_INDEX + 4)
 """The finger's joints among the 20."""

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.keyboard import KeyboardConfig
-from envs.keyboard_measures import press_measures
-from envs.keyboard_model import KEY_NAMES
-from envs.keyboard_requests import (
+from envs.tasks.keyboard.measures import press_measures
+from envs.tasks.keyboard.model import KEY_NAMES
+from envs.tasks.keyboard.requests import (
     IDLE,
     RequestConfig,
     begin_requests,
@@ -19,6 +18,7 @@ from envs.keyboard_requests import (
     next_request,
     one_hot,
 )
+from envs.tasks.keyboard.task import KeyboardConfig
 
 DT_S, CONFIG = 0.02, RequestConfig(idle_s=(0.1, 0.2), timeout_s=0.3)
 KEYS = len(KEY_NAMES)

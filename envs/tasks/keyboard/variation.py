@@ -9,15 +9,15 @@ import mujoco
 from jaxtyping import Array, Float
 
 from envs.errors import check_ordered
-from envs.keyboard_model import (
+from envs.physics import ModelFields
+from envs.streams import stream
+from envs.tasks.keyboard.model import (
     ACTUATION_M,
     FORCE_N,
     KEY_NAMES,
     KEYBOARD,
     key_spring,
 )
-from envs.physics import ModelFields
-from envs.streams import stream
 
 
 @dataclass(frozen=True)

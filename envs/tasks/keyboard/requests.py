@@ -14,8 +14,8 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from envs.errors import InputError, check_ordered
-from envs.keyboard_model import ARROWS
 from envs.streams import stream
+from envs.tasks.keyboard.model import ARROWS
 
 IDLE = -1
 

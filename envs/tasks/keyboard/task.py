@@ -16,35 +16,6 @@ from envs.errors import InputError
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
 from envs.hand.stance import Stance
-from envs.keyboard_fingertip import TIP_RADIUS_M, fingertip_v
-from envs.keyboard_measures import press_measures
-from envs.keyboard_model import (
-    ACTUATION_M,
-    ARROWS,
-    KEY_CENTRES_M,
-    KEY_NAMES,
-    TOP_M,
-    add_keyboard,
-    free_fingertip,
-    key_events,
-)
-from envs.keyboard_requests import (
-    IDLE,
-    RequestConfig,
-    Requests,
-    begin_requests,
-    check_requests,
-    judge,
-    next_request,
-    one_hot,
-)
-from envs.keyboard_stance import FINGER_INDEX, PLACEMENT, SUPPORTS, keyboard_stance
-from envs.keyboard_variation import (
-    KeyboardDraw,
-    KeyboardVariation,
-    draw_keyboard,
-    keyboard_fields,
-)
 from envs.memory import Lasting, Memory
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
@@ -54,6 +25,40 @@ from envs.scoring import check_weights
 from envs.settings import HandSettings
 from envs.signals import Signals
 from envs.streams import stream
+from envs.tasks.keyboard.fingertip import TIP_RADIUS_M, fingertip_v
+from envs.tasks.keyboard.measures import press_measures
+from envs.tasks.keyboard.model import (
+    ACTUATION_M,
+    ARROWS,
+    KEY_CENTRES_M,
+    KEY_NAMES,
+    TOP_M,
+    add_keyboard,
+    free_fingertip,
+    key_events,
+)
+from envs.tasks.keyboard.requests import (
+    IDLE,
+    RequestConfig,
+    Requests,
+    begin_requests,
+    check_requests,
+    judge,
+    next_request,
+    one_hot,
+)
+from envs.tasks.keyboard.stance import (
+    FINGER_INDEX,
+    PLACEMENT,
+    SUPPORTS,
+    keyboard_stance,
+)
+from envs.tasks.keyboard.variation import (
+    KeyboardDraw,
+    KeyboardVariation,
+    draw_keyboard,
+    keyboard_fields,
+)
 from rewards import KEYBOARD, RewardTable, safe_norm, support_drift
 
 PRESS_DEPTH_M = 0.001
@@ -287,7 +292,7 @@ class Keyboard:
     def episode_measures(
         self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
     ) -> dict[str, Float[Array, ""]]:
-        """See `envs.keyboard_measures`."""
+        """See `envs.tasks.keyboard.measures`."""
         return press_measures(recorded, counts)
 
     def _draw(self, lasting: Lasting) -> KeyboardDraw:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from envs.keyboard_model import KEY_NAMES
+from envs.tasks.keyboard.model import KEY_NAMES
 
 
 def press_measures(
@@ -21,7 +21,7 @@ def press_measures(
     supporting tips at the end from where they stood half a second into the episode.
 
     Args:
-        recorded: signals of `envs.keyboard.Keyboard.scene_signals` over T steps.
+        recorded: signals of `envs.tasks.keyboard.task.Keyboard.scene_signals` over T steps.
         counts: the steps that count.
     """
     hit, wrong, timeout, stray = (
