@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.batch import BatchEnv
-from envs.camera import read_camera
 from envs.memory import Memory
 from envs.observations import Sample
-from envs.push import PushMemory
-from envs.push_scene import HALF_M
+from envs.tasks.push.camera import read_camera
+from envs.tasks.push.scene import HALF_M
+from envs.tasks.push.task import PushMemory
 from fingers_deploy.tracking import Frame, ObjectTracker
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from envs.push_measures import ENTER_M, STAY_M
+from envs.tasks.push.measures import ENTER_M, STAY_M
 from fingers_mjx.play import Played
 from fingers_mjx.raycast_camera import Camera
 from fingers_mjx.raycast_overlay import Line, draw

@@ -1,6 +1,6 @@
 """From samples of an overhead camera to the pushing policy's inputs.
 
-Training uses the same formulas on simulated samples (`envs.object_tracking`).
+Training uses the same formulas on simulated samples (`envs.tasks.push.tracking`).
 """
 
 import math

@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs import object_tracking as trained
-from envs.camera import Frame
 from envs.hand.stance import load_stance
 from envs.rotations import unrotate
+from envs.tasks.push import tracking as trained
+from envs.tasks.push.camera import Frame
 from fingers_deploy import tracking as deployed
 
 Q_OFF = np.array(load_stance().q_off)

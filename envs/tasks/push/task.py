@@ -10,26 +10,14 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Bool, Float
 
-from envs.camera import (
-    CameraConfig,
-    CameraState,
-    Frame,
-    read_camera,
-    start_camera,
-    step_camera,
-)
 from envs.env import HandEnv
 from envs.errors import check_ordered
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
 from envs.memory import Lasting, Memory
-from envs.object_tracking import Track, start_track, step_track, track_inputs
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
-from envs.push_guide import POCKET_V, guide
-from envs.push_measures import push_measures
-from envs.push_scene import CUBE, HALF_M, POS, VEL, add_cube, place_cube
 from envs.rotations import multiply, rotate, unrotate
 from envs.scoring import check_weights
 from envs.settings import HandSettings
@@ -37,6 +25,18 @@ from envs.signals import Signals
 from envs.streams import stream
 from envs.task import BareTask
 from envs.tasks.gait import fallen, step_gait
+from envs.tasks.push.camera import (
+    CameraConfig,
+    CameraState,
+    Frame,
+    read_camera,
+    start_camera,
+    step_camera,
+)
+from envs.tasks.push.guide import POCKET_V, guide
+from envs.tasks.push.measures import push_measures
+from envs.tasks.push.scene import CUBE, HALF_M, POS, VEL, add_cube, place_cube
+from envs.tasks.push.tracking import Track, start_track, step_track, track_inputs
 from envs.tasks.start import near_stance
 from rewards import (
     PUSH,
@@ -264,7 +264,7 @@ class Push(BareTask):
     def episode_measures(
         self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
     ) -> dict[str, Float[Array, ""]]:
-        """Delivery, see `envs.push_measures`."""
+        """Delivery, see `envs.tasks.push.measures`."""
         return push_measures(
             recorded["target_error_m"],
             recorded["target_distance_m"],

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from envs.camera import Frame
+from envs.tasks.push.camera import Frame
 
 VELOCITY_TIME_S = 0.15
 """Time constant τ of the velocity estimate [s]; ours."""

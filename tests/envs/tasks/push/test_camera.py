@@ -3,8 +3,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.camera import CameraConfig, Frame, read_camera, start_camera, step_camera
 from envs.errors import InputError
+from envs.tasks.push.camera import (
+    CameraConfig,
+    Frame,
+    read_camera,
+    start_camera,
+    step_camera,
+)
 
 DT = 0.02
 STEPS = 400

@@ -6,14 +6,14 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.camera import CameraConfig
 from envs.errors import InputError
-from envs.push import PushConfig, PushEnv
-from envs.push_guide import ARRIVED_M, POCKET_V, TOP_SPEED_MPS, guide
-from envs.push_measures import push_measures
-from envs.push_scene import CUBE, POS
 from envs.randomize import no_randomization
 from envs.rotations import rotate
+from envs.tasks.push.camera import CameraConfig
+from envs.tasks.push.guide import ARRIVED_M, POCKET_V, TOP_SPEED_MPS, guide
+from envs.tasks.push.measures import push_measures
+from envs.tasks.push.scene import CUBE, POS
+from envs.tasks.push.task import PushConfig, PushEnv
 
 CLEAN = CameraConfig(
     latency_steps=(0, 0), dropout=0.0, position_noise_m=0.0, heading_noise_rad=0.0
