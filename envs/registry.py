@@ -6,10 +6,10 @@ from typing import Any
 
 from envs.batch import BatchEnv, Env
 from envs.errors import InputError, one_of
-from envs.recovery import RecoveryConfig, RecoveryEnv
 from envs.tasks.crawl import CrawlConfig, CrawlEnv
 from envs.tasks.keyboard.task import KeyboardConfig, KeyboardEnv
 from envs.tasks.push.task import PushConfig, PushEnv
+from envs.tasks.recovery.task import RecoveryConfig, RecoveryEnv
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,7 @@ def nominal(setup: Setup) -> Setup:
 def as_deployed(setup: Setup) -> Setup:
     """Returns `setup` with what the shim does beside the policy.
 
-    Of a recovery it is the end: detector and ramp (`envs.recovery_settle`).
+    Of a recovery it is the end: detector and ramp (`envs.tasks.recovery.settle`).
     """
     if not hasattr(setup.env, "settle"):
         return setup
@@ -62,7 +62,7 @@ def as_deployed(setup: Setup) -> Setup:
 def without_practice(setup: Setup) -> Setup:
     """Returns `setup` with episodes that all begin as the task says.
 
-    Only training starts from practice poses (`envs.recovery_practice`).
+    Only training starts from practice poses (`envs.tasks.recovery.practice`).
     """
     if not hasattr(setup.env, "practice_fraction"):
         return setup

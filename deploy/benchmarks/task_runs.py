@@ -24,10 +24,10 @@ import numpy as np
 from faults.lab import Lab
 from hand_files import WALKING, write_model
 
-from envs.recovery_falls import load_falls
 from envs.registry import make_batch
 from envs.tasks.keyboard.model import ACTUATION_M, ARROWS
 from envs.tasks.push.scene import HALF_M
+from envs.tasks.recovery.falls import load_falls
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.rotations import heading, multiply
 from fingers_robot.behaviour.command import FixedCommand

@@ -9,7 +9,7 @@ import pytest
 from support.cli_setup import TRAIN, make_bundle, make_setup, random_weights
 
 from envs.errors import InputError
-from envs.recovery_falls import Falls
+from envs.tasks.recovery.falls import Falls
 from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.rotations import gravity
 from fingers_mjx import cli_play

@@ -16,7 +16,7 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S, build_spec
 from envs.hand.stance import load_stance, stance_of
 from envs.randomize import model_fields
-from envs.recovery_falls import falls_of
+from envs.tasks.recovery.falls import falls_of
 
 STEPS = 25
 # Sizes at which an effect shows within half a second of motion in the air and on tips.

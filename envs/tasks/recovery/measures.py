@@ -6,8 +6,8 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-from envs.recovery_falls import SIDES
-from envs.recovery_settle import UPRIGHT_TILT_DEG
+from envs.tasks.recovery.falls import SIDES
+from envs.tasks.recovery.settle import UPRIGHT_TILT_DEG
 
 MAX_TILT_RAD = math.radians(UPRIGHT_TILT_DEG)
 
@@ -24,7 +24,7 @@ def recovery_measures(
     where the ramp was not over by the end of the episode.
 
     Args:
-        recorded: the signals of `envs.recovery.Recovery.scene_signals` over the
+        recorded: the signals of `envs.tasks.recovery.task.Recovery.scene_signals` over the
             control steps.
         counts: the steps that count.
         dt_s: control interval [s].

@@ -21,7 +21,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.model import build_model
 from envs.hand.stance import Stance
-from envs.recovery_falls import (
+from envs.tasks.recovery.falls import (
     Falls,
     clearance_m,
     curl,

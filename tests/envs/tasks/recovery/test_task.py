@@ -11,8 +11,9 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.stance import stance_of
 from envs.randomize import no_randomization
-from envs.recovery import RecoveryConfig, RecoveryEnv
-from envs.recovery_falls import (
+from envs.registry import make_batch
+from envs.rotations import multiply
+from envs.tasks.recovery.falls import (
     POSES_PER_SIDE,
     SIDES,
     clearance_m,
@@ -21,8 +22,7 @@ from envs.recovery_falls import (
     load_falls,
     settle_falls,
 )
-from envs.registry import make_batch
-from envs.rotations import multiply
+from envs.tasks.recovery.task import RecoveryConfig, RecoveryEnv
 from rewards import RECOVERY
 
 
@@ -97,7 +97,7 @@ def test_another_hand_falls_anew(monkeypatch):
     falls = falls_of(light, stance_of(light))
     assert falls.hand_sha256 == light.sha256 != hand.sha256
     assert falls.qpos != load_falls().qpos
-    monkeypatch.setattr("envs.recovery_falls._TRIES", 3)
+    monkeypatch.setattr("envs.tasks.recovery.falls._TRIES", 3)
     with pytest.raises(InputError, match=r"falls: thumb side: found \d of 3 falls"):
         settle_falls(light, stance_of(light))
 

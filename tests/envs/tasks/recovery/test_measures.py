@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from envs.recovery_measures import recovery_measures
+from envs.tasks.recovery.measures import recovery_measures
 
 STEPS, DT_S = 100, 0.02
 

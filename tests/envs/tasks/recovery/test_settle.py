@@ -9,8 +9,8 @@ import pytest
 
 from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import stance_of
-from envs.recovery_settle import Settle, action_toward, start_settling
 from envs.registry import make_batch
+from envs.tasks.recovery.settle import Settle, action_toward, start_settling
 from fingers_deploy.rotations import conjugate, gravity, multiply
 from fingers_mjx.policy_interface import interface_of
 from fingers_robot.behaviour.settle import settle_ramp

@@ -9,15 +9,15 @@ import pytest
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.stance import stance_of
-from envs.recovery import RecoveryConfig, RecoveryEnv
-from envs.recovery_falls import clearance_m, down_b, load_falls, turned_down
-from envs.recovery_practice import (
+from envs.tasks.recovery.falls import clearance_m, down_b, load_falls, turned_down
+from envs.tasks.recovery.practice import (
     SINKING,
     TIPPING,
     load_practice,
     practice_json,
     settle_practice,
 )
+from envs.tasks.recovery.task import RecoveryConfig, RecoveryEnv
 
 HAND = load_hand_file()
 LEVEL = down_b(np.array(stance_of(HAND).qpos))

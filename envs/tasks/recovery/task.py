@@ -17,10 +17,16 @@ from envs.hand.stance import Stance, stance_of
 from envs.memory import Lasting, Memory
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
-from envs.recovery_falls import SIDES, Falls, falls_of
-from envs.recovery_measures import recovery_measures
-from envs.recovery_practice import Poses, practice_of
-from envs.recovery_settle import (
+from envs.rotations import about_z, multiply, unrotate
+from envs.scoring import check_weights
+from envs.settings import HandSettings
+from envs.signals import Signals
+from envs.streams import stream
+from envs.task import BareTask
+from envs.tasks.recovery.falls import SIDES, Falls, falls_of
+from envs.tasks.recovery.measures import recovery_measures
+from envs.tasks.recovery.practice import Poses, practice_of
+from envs.tasks.recovery.settle import (
     Settle,
     Settling,
     action_toward,
@@ -28,12 +34,6 @@ from envs.recovery_settle import (
     start_settling,
     tilt_rad,
 )
-from envs.rotations import about_z, multiply, unrotate
-from envs.scoring import check_weights
-from envs.settings import HandSettings
-from envs.signals import Signals
-from envs.streams import stream
-from envs.task import BareTask
 from rewards import RECOVERY, RewardTable
 
 
@@ -54,7 +54,7 @@ class RecoveryConfig(HandSettings):
             the upright detector has fired. Evaluations do so; in training the policy
             goes on, so that it learns to stay up (paper).
         practice_fraction: share of training episodes that start from a practice pose
-            (`envs.recovery_practice`) instead of a fall (ours). With `settle` there are
+            (`envs.tasks.recovery.practice`) instead of a fall (ours). With `settle` there are
             none.
     """
 
