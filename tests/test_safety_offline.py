@@ -59,7 +59,7 @@ def test_everything_works_without_a_network(tmp_path):
         return done.stdout
 
     def fingers(*words):
-        return python("-m", "fingers_mjx.cli", *map(str, words))
+        return python("-m", "fingers_mjx.cli.main", *map(str, words))
 
     run, bundle = tmp_path / "run", tmp_path / "bundle"
     fingers("train", "crawl", "--preset", "cpu", "--out", run, "--set", *TINY)

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from support.cli_setup import TRAIN, make_bundle, make_setup
 
-from fingers_mjx.cli import main
-from fingers_mjx.cli_progress import counting
+from fingers_mjx.cli.main import main
+from fingers_mjx.cli.output import counting
 from fingers_mjx.demo import DemoSize
 from fingers_mjx.demo_explore import Exploring
 from fingers_mjx.demo_learn import LearnSize

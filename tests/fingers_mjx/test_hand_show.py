@@ -10,7 +10,7 @@ from PIL import Image
 from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import load_stance
 from fingers_mjx import hand_show
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ import pytest
 from support.outside_task import CROUCH, register_crouch
 
 from envs import registry
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 
 FEW = (
     "num_envs=4",

@@ -21,7 +21,7 @@ from rosbags.typesys import Stores, get_typestore
 from support.log_damage import HOSTILE, csv_damage, flipped, torn
 from support.sysid_logs import small_log
 
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from sysid.data_read import read_log, write_log
 
 FEW, MANY = 100, 3000

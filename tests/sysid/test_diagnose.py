@@ -19,7 +19,7 @@ from benchmarks.diagnosis.hidden.sizes import SCALES
 from benchmarks.diagnosis.hidden.stands import make_stand
 from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from envs.hand.hand_file import load_hand_file
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from sysid.data import MeasuredLog, make_log
 from sysid.data_read import write_log
 from sysid.diagnose import diagnose

@@ -5,7 +5,7 @@ import pytest
 
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from sysid.data import make_log
 from sysid.data_read import write_log
 from sysid.diagnose import diagnose

@@ -3,7 +3,7 @@ import pytest
 from support.sysid_logs import small_log
 
 from envs.errors import InputError
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from sysid.data import make_log
 from sysid.data_info import info_lines
 from sysid.data_read import write_log

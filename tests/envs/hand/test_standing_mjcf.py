@@ -7,7 +7,7 @@ import pytest
 from envs.hand.figures import figures
 from envs.hand.hand_file import DEFAULT_HAND_FILE
 from envs.hand.stance import load_stance
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from fingers_robot.simulator.hand import SimulatedHand
 
 

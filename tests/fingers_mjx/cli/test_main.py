@@ -10,7 +10,7 @@ from support.cli_setup import make_run, make_setup
 from envs.hand.hand_file import DEFAULT_HAND_FILE
 from envs.hand.stance import load_stance
 from fingers_mjx import checkpoint
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from fingers_mjx.demo import POLICY_DIR
 from fingers_mjx.evaluate_files import read_table
 from fingers_mjx.policy_source import load_source
@@ -213,7 +213,7 @@ def test_exit_status_says_how_it_ended(monkeypatch, tmp_path, capsys, error, sta
     def end(args):
         raise error
 
-    monkeypatch.setattr("fingers_mjx.cli_train.run", end)
+    monkeypatch.setattr("fingers_mjx.cli.train.run", end)
     assert main(["train", "crawl", "--out", str(tmp_path / "run")]) == status
     said = capsys.readouterr().err
     assert said.startswith("fingers: ")
@@ -224,7 +224,7 @@ def test_a_fault_of_ours_is_not_hidden(monkeypatch):
     def fail(args):
         raise ZeroDivisionError
 
-    monkeypatch.setattr("fingers_mjx.cli_train.run", fail)
+    monkeypatch.setattr("fingers_mjx.cli.train.run", fail)
     with pytest.raises(ZeroDivisionError):
         main(["train", "crawl"])
 
@@ -233,7 +233,7 @@ def test_a_missing_extra_is_named(monkeypatch, capsys):
     def fail(args):
         raise ModuleNotFoundError("No module named 'matplotlib'", name="matplotlib")
 
-    monkeypatch.setattr("fingers_mjx.cli_train.run", fail)
+    monkeypatch.setattr("fingers_mjx.cli.train.run", fail)
     assert main(["train", "crawl"]) == 2
     assert "fingers-mjx[viz]" in capsys.readouterr().err
 

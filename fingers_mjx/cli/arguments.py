@@ -6,9 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NoReturn
 
-from fingers_mjx.cli_parser_hand import add_hand
-from fingers_mjx.cli_parser_sysid import add_calibrate, add_diagnose, add_excite
-from fingers_mjx.cli_parser_transfer import add_transfer
+from fingers_mjx.cli.arguments_hand import add_hand
+from fingers_mjx.cli.arguments_sysid import add_calibrate, add_diagnose, add_excite
+from fingers_mjx.cli.arguments_transfer import add_transfer
 
 MAX_SEED = 2**32 - 1
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"

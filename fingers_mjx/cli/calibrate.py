@@ -4,7 +4,7 @@ import argparse
 
 from envs.config.typed import load_yaml
 from envs.hand.hand_file import save_hand_file
-from fingers_mjx.cli_sysid_excite import mechanism_of
+from fingers_mjx.cli.excite import mechanism_of
 from sysid.calibrate import Calibration, calibrate, calibrated_hand
 from sysid.calibrate_figures import write_figures
 from sysid.data_bag import BagMap

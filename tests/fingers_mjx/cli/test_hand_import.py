@@ -7,7 +7,7 @@ from support.cli_setup import contents
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 
 
 @pytest.fixture

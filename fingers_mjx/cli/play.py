@@ -7,10 +7,10 @@ from typing import Any
 
 from envs.errors import InputError, one_of
 from fingers_deploy import Bundle
-from fingers_mjx.cli_paths import check_file
-from fingers_mjx.cli_play_keys import key_times, keys_asked, start_board
-from fingers_mjx.cli_progress import counting
-from fingers_mjx.cli_table import print_measures
+from fingers_mjx.cli.output import counting
+from fingers_mjx.cli.paths import check_file
+from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
+from fingers_mjx.cli.table import print_measures
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import (
     document,

@@ -9,7 +9,7 @@ import pytest
 from support.cli_setup import contents, make_bundle, make_run, make_setup
 
 from fingers_deploy.manifest import Interface
-from fingers_mjx.cli import main
+from fingers_mjx.cli.main import main
 from fingers_mjx.policy_interface import interface_of
 from fingers_mjx.run_setup import make_env
 
@@ -300,7 +300,7 @@ def test_a_bundle_of_another_version_of_the_task(here, capsys):
 
 def test_the_real_command(here):
     before = contents(here)
-    command = [sys.executable, "-m", "fingers_mjx.cli", "eval", "swapped"]
+    command = [sys.executable, "-m", "fingers_mjx.cli.main", "eval", "swapped"]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 2
     assert done.stdout == ""
@@ -313,7 +313,7 @@ def test_help_is_quick_to_come(here):
     """It must not wait for JAX or MuJoCo."""
     code = (
         "import json, sys\n"
-        "from fingers_mjx.cli import main\n"
+        "from fingers_mjx.cli.main import main\n"
         "try:\n    main(['train', '--help'])\n"
         "except SystemExit as end:\n    status = end.code\n"
         "heavy = sorted({'jax', 'mujoco', 'brax', 'numpy'} & set(sys.modules))\n"

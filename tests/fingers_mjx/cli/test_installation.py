@@ -16,15 +16,14 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from fingers_mjx import installation
-from fingers_mjx.cli import main
-from fingers_mjx.installation import (
+from fingers_mjx.cli.installation import (
     UnsupportedInstallation,
     check_installation,
     check_places,
     check_python,
     check_requirement,
 )
+from fingers_mjx.cli.main import installation, main
 
 ROOT = Path(__file__).parents[2]
 NEVER = {
@@ -83,7 +82,7 @@ def test_foreign_package_in_our_place_is_told(tmp_path, name, kind):
         (place / "__init__.py").write_text("")
     path = os.pathsep.join([str(tmp_path), str(ROOT), str(ROOT / "deploy")])
     done = subprocess.run(
-        [sys.executable, "-m", "fingers_mjx.cli", "train", "no-task"],
+        [sys.executable, "-m", "fingers_mjx.cli.main", "train", "no-task"],
         cwd=tmp_path,
         env=os.environ | {"PYTHONPATH": path},
         capture_output=True,

@@ -11,8 +11,8 @@ import sys
 import warnings
 from collections.abc import Sequence
 
-from fingers_mjx.cli_parser import UsageError, make_parser
-from fingers_mjx.installation import check_installation
+from fingers_mjx.cli.arguments import UsageError, make_parser
+from fingers_mjx.cli.installation import check_installation
 
 BAD_INPUT, DISK_FULL, KEYBOARD = 2, 4, 130
 _EXTRAS = {

@@ -7,10 +7,10 @@ from typing import Any
 
 from envs.errors import InputError
 from envs.physics import default_backend
-from fingers_mjx.cli_paths import check_directory, check_file
-from fingers_mjx.cli_progress import counting
-from fingers_mjx.cli_table import print_measures
-from fingers_mjx.cli_train import check_backend
+from fingers_mjx.cli.output import counting
+from fingers_mjx.cli.paths import check_directory, check_file
+from fingers_mjx.cli.table import print_measures
+from fingers_mjx.cli.train import check_backend
 from fingers_mjx.evaluate_files import write_summary
 from fingers_mjx.evaluate_source import (
     as_deployed,

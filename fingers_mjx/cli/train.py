@@ -11,7 +11,7 @@ from envs.errors import InputError, one_of
 from envs.physics import BACKENDS, default_backend
 from envs.physics.quiet_mjx import WARP_INSTALLED
 from envs.registry import get_task, task_names
-from fingers_mjx.cli_paths import check_directory
+from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.ppo_config import TrainConfig, preset
 from fingers_mjx.ppo_state import train_template
 from fingers_mjx.progress import reporter

@@ -55,7 +55,7 @@ def _import(actions) -> None:
         "its own, collision shapes are fitted to it. Says what it lacks.",
         allow_abbrev=False,
     )
-    parser.set_defaults(module="cli_hand_import")
+    parser.set_defaults(module="hand_import")
     parser.add_argument("mjcf", type=Path, metavar="MJCF", help="such as vendor.xml")
     parser.add_argument(
         "--joint-map",

@@ -7,7 +7,7 @@ from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.stance import settle, stance_json, stance_of
 from envs.hand.stance_search import search_stance
 from envs.hand.standing_mjcf import standing_mjcf
-from fingers_mjx.cli_paths import check_directory, check_file
+from fingers_mjx.cli.paths import check_directory, check_file
 from fingers_mjx.evaluate_files import write_atomic
 
 

@@ -1,0 +1,1 @@
+"""The command `fingers`: one module for each of its commands."""
