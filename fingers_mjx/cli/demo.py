@@ -6,8 +6,8 @@ from functools import partial
 
 from fingers_mjx.cli.output import counting
 from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.demo import POLICY_DIR, demo
-from fingers_mjx.demo_screen import Screen
+from fingers_mjx.demo.demo import POLICY_DIR, demo
+from fingers_mjx.demo.screen import Screen
 from fingers_mjx.progress import reporter
 
 

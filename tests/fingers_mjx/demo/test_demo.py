@@ -12,10 +12,10 @@ from support.cli_setup import TRAIN, make_bundle, make_setup
 
 from fingers_mjx.cli.main import main
 from fingers_mjx.cli.output import counting
-from fingers_mjx.demo import DemoSize
-from fingers_mjx.demo_explore import Exploring
-from fingers_mjx.demo_learn import LearnSize
-from fingers_mjx.demo_show import ShowSize
+from fingers_mjx.demo.demo import DemoSize
+from fingers_mjx.demo.explore import Exploring
+from fingers_mjx.demo.learn import LearnSize
+from fingers_mjx.demo.show import ShowSize
 from fingers_mjx.policy_source import load_source
 
 SIZE = DemoSize(
@@ -29,7 +29,7 @@ def shown(tmp_path_factory):
     path = tmp_path_factory.mktemp("demo")
     bundle = make_bundle(path / "policy", make_setup())
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("fingers_mjx.demo.DemoSize", lambda: SIZE)
+        patch.setattr("fingers_mjx.demo.demo.DemoSize", lambda: SIZE)
         argv = ["demo", "--out", str(path / "out"), "--policy", str(bundle)]
         assert main(argv) == 0
     return path / "out"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fingers_deploy import Bundle
-from fingers_mjx.demo_screen import Screen, timed
+from fingers_mjx.demo.screen import Screen, timed
 from fingers_mjx.evaluate import EpisodeTable
 from fingers_mjx.evaluate_source import (
     document,

@@ -4,10 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fingers_mjx.demo_learn import LearnSize, default_size, learn
-from fingers_mjx.demo_report import write_demo_report
-from fingers_mjx.demo_screen import Screen
-from fingers_mjx.demo_show import ShowSize, show
+from fingers_mjx.demo.learn import LearnSize, default_size, learn
+from fingers_mjx.demo.report import write_demo_report
+from fingers_mjx.demo.screen import Screen
+from fingers_mjx.demo.show import ShowSize, show
 from fingers_mjx.policy_source import PolicySource, load_bundle_setup
 
 POLICY_DIR = Path(__file__).with_name("policies") / "crawl"

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 
 from fingers_mjx import figures, report
-from fingers_mjx.demo_learn import Learned
-from fingers_mjx.demo_show import FILM, Shown
+from fingers_mjx.demo.learn import Learned
+from fingers_mjx.demo.show import FILM, Shown
 from fingers_mjx.evaluate_source import document, evaluation_figures
 from fingers_mjx.rundir_metrics import read_metrics
 from fingers_mjx.stats import summarize

@@ -1,0 +1,1 @@
+"""The demonstration: evaluate, play, train, export, one report."""
