@@ -8,7 +8,7 @@ from envs.batch import BatchEnv
 from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx.checkpoint import Saved
-from fingers_mjx.evaluate_files import SUMMARY_FILE, write_atomic
+from fingers_mjx.evaluation.files import SUMMARY_FILE, write_atomic
 from fingers_mjx.export import (
     Apply,
     ExportReport,

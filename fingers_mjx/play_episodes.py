@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import jax
 import numpy as np
 
-from fingers_mjx.evaluate import EpisodeTable, Progress, episode_table
-from fingers_mjx.evaluate_record import Trace
-from fingers_mjx.evaluate_source import hand_mass_kg
+from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, episode_table
+from fingers_mjx.evaluation.record import Trace
+from fingers_mjx.evaluation.source import hand_mass_kg
 from fingers_mjx.play import Played, Player, Schedule
 
 

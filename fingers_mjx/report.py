@@ -15,7 +15,7 @@ import jinja2
 from matplotlib.figure import Figure
 
 from envs.errors import InputError
-from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.evaluation.files import write_atomic
 
 TEMPLATE = Path(__file__).with_name("report.html")
 PACKAGES = ("fingers-mjx", "jax", "mujoco", "mujoco-mjx", "brax", "numpy", "onnx")

@@ -15,15 +15,15 @@ import numpy as np
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
-from fingers_mjx.evaluate import EpisodeTable
-from fingers_mjx.evaluate_files import summary_document
-from fingers_mjx.evaluate_source import evaluate_source, nominal, with_command
-from fingers_mjx.measures import steps_alive
+from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.files import summary_document
+from fingers_mjx.evaluation.measures import steps_alive
+from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
+from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy_source import PolicySource
 from fingers_mjx.progress import OnProgress
 from fingers_mjx.report import commit_here
 from fingers_mjx.run_setup import Setup, identity, make_env
-from fingers_mjx.stats import paired_difference
 from fingers_mjx.train import Result, train
 
 MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")

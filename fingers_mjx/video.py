@@ -13,7 +13,7 @@ from PIL import Image
 from scipy.ndimage import gaussian_filter1d
 
 from envs.errors import InputError
-from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.raycast import render
 from fingers_mjx.raycast_camera import Camera
 from fingers_mjx.raycast_shade import Look

@@ -7,7 +7,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli.diagnose_walk import run_walk, walks
 from fingers_mjx.cli.excite import mechanism_of
-from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.evaluation.files import write_atomic
 from sysid.data_bag import BagMap
 from sysid.data_read import read_log
 from sysid.diagnose import examine

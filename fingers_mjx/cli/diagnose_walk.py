@@ -7,8 +7,8 @@ from collections.abc import Sequence
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, save_hand_file
-from fingers_mjx.evaluate_files import write_atomic
-from fingers_mjx.evaluate_source import nominal
+from fingers_mjx.evaluation.files import write_atomic
+from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.ppo_config import preset
 from fingers_mjx.run_setup import Setup, make_env, new_setup
 from sysid.data import MeasuredLog

@@ -11,8 +11,8 @@ from fingers_mjx.cli.output import counting
 from fingers_mjx.cli.paths import check_directory, check_file
 from fingers_mjx.cli.table import print_measures
 from fingers_mjx.cli.train import check_backend
-from fingers_mjx.evaluate_files import write_summary
-from fingers_mjx.evaluate_source import (
+from fingers_mjx.evaluation.files import write_summary
+from fingers_mjx.evaluation.source import (
     as_deployed,
     check_policy_settings,
     document,

@@ -8,7 +8,7 @@ from envs.hand.stance import settle, stance_json, stance_of
 from envs.hand.stance_search import search_stance
 from envs.hand.standing_mjcf import standing_mjcf
 from fingers_mjx.cli.paths import check_directory, check_file
-from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.evaluation.files import write_atomic
 
 
 def run(args: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from envs.hand.hand_file import HandFile, hand_yaml
 from envs.hand.importing.figures import import_hand
 from envs.hand.stance import stance_of
 from fingers_mjx.cli.paths import check_file
-from fingers_mjx.evaluate_files import write_atomic
+from fingers_mjx.evaluation.files import write_atomic
 
 _TURN = {"low": -1.0, "high": 1.0}
 

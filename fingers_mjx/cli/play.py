@@ -11,8 +11,8 @@ from fingers_mjx.cli.output import counting
 from fingers_mjx.cli.paths import check_file
 from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
 from fingers_mjx.cli.table import print_measures
-from fingers_mjx.evaluate_files import write_summary
-from fingers_mjx.evaluate_source import (
+from fingers_mjx.evaluation.files import write_summary
+from fingers_mjx.evaluation.source import (
     document,
     nominal,
     with_command,

@@ -11,7 +11,7 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.streams import stream
-from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
 from fingers_mjx.ppo_policy import Network, act
 
 

@@ -8,9 +8,9 @@ import numpy as np
 from fingers_mjx import figures, report
 from fingers_mjx.demo.learn import Learned
 from fingers_mjx.demo.show import FILM, Shown
-from fingers_mjx.evaluate_source import document, evaluation_figures
+from fingers_mjx.evaluation.source import document, evaluation_figures
+from fingers_mjx.evaluation.stats import summarize
 from fingers_mjx.rundir_metrics import read_metrics
-from fingers_mjx.stats import summarize
 
 COMPARED = (
     "survival",

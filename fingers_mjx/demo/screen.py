@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
-from fingers_mjx.evaluate import Progress
+from fingers_mjx.evaluation.evaluate import Progress
 from fingers_mjx.progress import OnProgress
 
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 from fingers_deploy import Bundle
 from fingers_mjx.demo.screen import Screen, timed
-from fingers_mjx.evaluate import EpisodeTable
-from fingers_mjx.evaluate_source import (
+from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.source import (
     document,
     evaluate_source,
     nominal,

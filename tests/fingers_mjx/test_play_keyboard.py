@@ -16,7 +16,7 @@ from envs.tasks.keyboard.fingertip import JOINTS
 from envs.tasks.keyboard.model import KEY_NAMES
 from fingers_deploy import load_bundle
 from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
-from fingers_mjx.evaluate_source import nominal
+from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play_episodes import play_episodes
 from fingers_mjx.play_keyboard import KeyPlayer, KeysPlayed, boards_of, keys_story
 from fingers_mjx.play_keyboard_video import write_keyboard_video

@@ -14,7 +14,7 @@ from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.rotations import gravity
 from fingers_mjx.cli.main import main
 from fingers_mjx.cli.main import play as cli_play
-from fingers_mjx.evaluate_source import as_deployed, nominal
+from fingers_mjx.evaluation.source import as_deployed, nominal
 from fingers_mjx.play import Player
 from fingers_mjx.play_behaviours import Behaviours, sticks_for
 from fingers_mjx.play_episodes import play_episodes

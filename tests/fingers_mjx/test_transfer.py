@@ -11,8 +11,8 @@ from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli.main import main
-from fingers_mjx.evaluate import EpisodeTable
-from fingers_mjx.evaluate_record import Trace
+from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.record import Trace
 from fingers_mjx.transfer import Evaluated, columns, compared, drift
 
 STEPS, EPISODES = 20, 3

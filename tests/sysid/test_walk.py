@@ -14,7 +14,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli.diagnose_walk import walk_setup
 from fingers_mjx.cli.main import main
-from fingers_mjx.evaluate_source import nominal
+from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play_episodes import schedule_of
 from fingers_mjx.policy_source import load_bundle_setup
 from fingers_mjx.run_setup import make_env

@@ -16,15 +16,15 @@ from envs.randomize import no_randomization
 from envs.tasks.keyboard.task import KeyboardConfig
 from envs.tasks.keyboard.variation import nominal_keyboard
 from fingers_mjx import figures
-from fingers_mjx.evaluate import EpisodeTable, Progress, evaluate
-from fingers_mjx.evaluate_files import (
+from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.evaluation.files import (
     SUMMARY_FILE,
     TABLE_FILE,
     summary_document,
     write_summary,
     write_table,
 )
-from fingers_mjx.measures import CONTACT_N
+from fingers_mjx.evaluation.measures import CONTACT_N
 from fingers_mjx.policy_source import PolicySource
 from fingers_mjx.ppo_policy import act
 from fingers_mjx.report import commit_here

@@ -11,10 +11,10 @@ from support.cli_setup import make_setup
 
 from envs.commands import sample_command
 from envs.errors import InputError
-from fingers_mjx import evaluate_source as module
-from fingers_mjx.evaluate import EpisodeTable
-from fingers_mjx.evaluate_record import Trace
-from fingers_mjx.evaluate_source import (
+from fingers_mjx.evaluation import source as module
+from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.record import Trace
+from fingers_mjx.evaluation.source import (
     check_policy_settings,
     evaluate_source,
     nominal,

@@ -9,9 +9,9 @@ import pytest
 from envs.base import State
 from envs.errors import InputError
 from envs.signals import Signals
-from fingers_mjx.evaluate import evaluate
-from fingers_mjx.evaluate_files import summary_document
-from fingers_mjx.evaluate_record import record
+from fingers_mjx.evaluation.evaluate import evaluate
+from fingers_mjx.evaluation.files import summary_document
+from fingers_mjx.evaluation.record import record
 
 DT, LIMIT = 0.02, 120
 FIELDS = ("joint_pos", "joint_vel", "joint_acc", "torque_nm", "action")

@@ -6,7 +6,7 @@ from jaxtyping import Array, Bool, Float
 
 from envs.base import State
 from envs.physics.room import ROOM
-from fingers_mjx import measures
+from fingers_mjx.evaluation import measures
 
 MASS_KG = 0.818
 

@@ -5,8 +5,8 @@ import pyarrow.parquet as pq
 import pytest
 
 from envs.errors import InputError
-from fingers_mjx import evaluate_files
-from fingers_mjx.evaluate_files import (
+from fingers_mjx.evaluation import files as evaluate_files
+from fingers_mjx.evaluation.files import (
     read_table,
     summary_document,
     write_atomic,

@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from envs.errors import InputError
-from fingers_mjx.stats import Summary, summarize
+from fingers_mjx.evaluation.stats import Summary, summarize
 
 SUMMARY_FILE, TABLE_FILE = "summary.json", "episodes.parquet"
 

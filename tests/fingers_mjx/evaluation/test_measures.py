@@ -3,7 +3,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from fingers_mjx import measures as ms
+from fingers_mjx.evaluation import measures as ms
 
 DT = 0.02
 NAIL, PAD = np.radians(80.0), np.radians(20.0)

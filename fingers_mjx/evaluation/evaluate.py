@@ -11,8 +11,8 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.errors import InputError
-from fingers_mjx.evaluate_record import MASS_KG, Trace, episode_measures, record
-from fingers_mjx.measures import steps_alive
+from fingers_mjx.evaluation.measures import steps_alive
+from fingers_mjx.evaluation.record import MASS_KG, Trace, episode_measures, record
 
 REPORT_EVERY = 50
 Policy = Callable[[dict[str, Array]], Float[Array, "B actions"]]

@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import norm, trim_mean
 
 from envs.errors import InputError
-from fingers_mjx.stats import (
+from fingers_mjx.evaluation.stats import (
     bootstrap_interval,
     interquartile_mean,
     paired_difference,

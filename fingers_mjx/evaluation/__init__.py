@@ -1,0 +1,1 @@
+"""Many randomized episodes of a policy, and the paper's measures of them."""
