@@ -18,7 +18,7 @@ from hand_files import WALKING
 
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.policy import OnnxPolicy
-from fingers_mjx.bundle import write_bundle
+from fingers_mjx.export.bundle import write_bundle
 from fingers_robot.cli.main import main as command
 
 CONTROL = 1000

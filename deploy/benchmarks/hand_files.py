@@ -27,8 +27,8 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
 
 WALKING = Path(fingers_mjx.__file__).parent / "policies" / "crawl"

@@ -14,8 +14,8 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.onnx_graph import PolicyWeights
 
 # The measurements are tested as well: `hand_files`, `fault_lab`, ….
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))

@@ -3,7 +3,7 @@
 import argparse
 
 from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.export_run import export_run
+from fingers_mjx.export.run import export_run
 from fingers_mjx.policy_source import check_run
 
 

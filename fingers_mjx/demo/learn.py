@@ -11,8 +11,8 @@ from envs.batch import BatchEnv
 from fingers_mjx.demo.explore import explore
 from fingers_mjx.demo.screen import Screen, timed
 from fingers_mjx.evaluation.evaluate import EpisodeTable
-from fingers_mjx.export import ExportReport, brax_weights
-from fingers_mjx.export_run import export_run
+from fingers_mjx.export.export import ExportReport, brax_weights
+from fingers_mjx.export.run import export_run
 from fingers_mjx.ppo_config import TrainConfig, preset
 from fingers_mjx.ppo_policy import Network, load_policy
 from fingers_mjx.ppo_state import init_train_state, make_learner

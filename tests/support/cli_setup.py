@@ -10,8 +10,8 @@ import numpy as np
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx import checkpoint
-from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
 from fingers_mjx.ppo_config import PpoConfig, TrainConfig
 from fingers_mjx.ppo_state import init_train_state, make_learner

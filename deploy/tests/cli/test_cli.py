@@ -10,7 +10,7 @@ import pytest
 from fuzz_bundles import loaded_unchecked
 from fuzz_bundles import measure as damage_bundles
 
-from fingers_mjx.bundle import write_bundle
+from fingers_mjx.export.bundle import write_bundle
 from fingers_robot.cli.main import main
 from fingers_robot.record import read_log
 from fingers_robot.safety import Mode

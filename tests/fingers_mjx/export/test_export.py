@@ -17,7 +17,7 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.export import (
+from fingers_mjx.export.export import (
     OBSERVATIONS,
     ExportError,
     brax_apply,

@@ -14,8 +14,8 @@ from fingers_deploy.manifest import Interface, Provenance
 from fingers_deploy.network import read_network
 from fingers_deploy.policy import OnnxPolicy, Policy
 from fingers_deploy.wire import read_model
-from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.onnx_graph import PolicyWeights, build_graph
+from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.onnx_graph import PolicyWeights, build_graph
 
 Apply = Callable[[Float[np.ndarray, "B N"]], Any]
 

@@ -9,14 +9,14 @@ from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx.checkpoint import Saved
 from fingers_mjx.evaluation.files import SUMMARY_FILE, write_atomic
-from fingers_mjx.export import (
+from fingers_mjx.export.export import (
     Apply,
     ExportReport,
     brax_apply,
     brax_weights,
     export_policy,
 )
-from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy_interface import interface_of
 from fingers_mjx.ppo_policy import read, warm_started
 from fingers_mjx.ppo_state import make_learner, train_template

@@ -6,7 +6,7 @@ import onnxruntime
 import pytest
 from onnx import numpy_helper
 
-from fingers_mjx.onnx_graph import PolicyWeights, build_graph
+from fingers_mjx.export.onnx_graph import PolicyWeights, build_graph
 
 SEED = 17
 

@@ -18,9 +18,9 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx import bundle as bundle_module
-from fingers_mjx.bundle import encode_bundle, write_bundle
-from fingers_mjx.onnx_graph import PolicyWeights
+from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.export import bundle as bundle_module
+from fingers_mjx.export.onnx_graph import PolicyWeights
 
 SEED = 23
 INTERFACE = Interface(

@@ -18,7 +18,7 @@ from fingers_deploy.manifest import (
     Provenance,
     dump_manifest,
 )
-from fingers_mjx.onnx_graph import PolicyWeights, build_graph, embed_manifest
+from fingers_mjx.export.onnx_graph import PolicyWeights, build_graph, embed_manifest
 
 
 def encode_bundle(

@@ -1,0 +1,1 @@
+"""Policy bundles: an ONNX graph with its manifest."""
