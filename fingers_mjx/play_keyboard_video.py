@@ -7,14 +7,14 @@ import mujoco
 import numpy as np
 
 from envs.tasks.keyboard.model import ARROWS, KEY_NAMES
+from fingers_mjx.pictures.camera import Camera
+from fingers_mjx.pictures.overlay import caption
+from fingers_mjx.pictures.video import Frame, frames, write_animation, write_mp4
 from fingers_mjx.play import Played
 from fingers_mjx.play_keyboard import boards_of
 from fingers_mjx.play_video import frame_steps
-from fingers_mjx.raycast_camera import Camera
-from fingers_mjx.raycast_overlay import caption
 from fingers_mjx.sokoban import Board
 from fingers_mjx.sokoban_board import draw_panel
-from fingers_mjx.video import Frame, frames, write_animation, write_mp4
 
 VIEW = Camera(
     lookat_w=(0.11, 0.0, 0.05), distance_m=0.33, azimuth_deg=215.0, elevation_deg=-34.0

@@ -7,11 +7,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from fingers_mjx.pictures.camera import Camera
+from fingers_mjx.pictures.overlay import caption
+from fingers_mjx.pictures.video import Frame, follow, frames, write_animation, write_mp4
 from fingers_mjx.play import Played
 from fingers_mjx.play_target import Target, target_of, with_target
-from fingers_mjx.raycast_camera import Camera
-from fingers_mjx.raycast_overlay import caption
-from fingers_mjx.video import Frame, follow, frames, write_animation, write_mp4
 
 VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16

@@ -36,7 +36,7 @@ def _write(text: str, out: Path | None) -> int:
 def _show(hand: HandFile, out: Path) -> int:
     from PIL import Image
 
-    from fingers_mjx.hand_show import facts, pictures, posed
+    from fingers_mjx.pictures.hand import facts, pictures, posed
 
     standing = posed(hand, stance_of(hand))
     for name, value in facts(standing).items():

@@ -14,9 +14,8 @@ from envs.hand.model import V_SITE, build_model
 from envs.hand.spec import TIP_SITES
 from envs.hand.stance import Stance
 from envs.hand.stance_search import support_margins
-from fingers_mjx.raycast import render
-from fingers_mjx.raycast_camera import Camera
-from fingers_mjx.raycast_overlay import (
+from fingers_mjx.pictures.camera import Camera
+from fingers_mjx.pictures.overlay import (
     Area,
     Dots,
     Item,
@@ -26,7 +25,8 @@ from fingers_mjx.raycast_overlay import (
     draw,
     frame_axes,
 )
-from fingers_mjx.raycast_shade import Look
+from fingers_mjx.pictures.raycast import render
+from fingers_mjx.pictures.shade import Look
 
 # Heading of the view; V points along world x in the stance.
 SIDES: Mapping[str, float] = {"front": 180.0, "left": 270.0, "back": 0.0, "right": 90.0}

@@ -1,7 +1,7 @@
 import numpy as np
 
-from fingers_mjx.raycast_camera import Camera, position, project
-from fingers_mjx.raycast_overlay import (
+from fingers_mjx.pictures.camera import Camera, position, project
+from fingers_mjx.pictures.overlay import (
     Area,
     Dots,
     Label,

@@ -12,8 +12,8 @@ import mujoco
 import numpy as np
 from jaxtyping import Float, Int, UInt8
 
-from fingers_mjx.raycast_camera import Camera, pixel_centres, position, rays
-from fingers_mjx.raycast_shade import (
+from fingers_mjx.pictures.camera import Camera, pixel_centres, position, rays
+from fingers_mjx.pictures.shade import (
     Look,
     checkerboard,
     encode,

@@ -14,9 +14,9 @@ from scipy.ndimage import gaussian_filter1d
 
 from envs.errors import InputError
 from fingers_mjx.evaluation.files import write_atomic
-from fingers_mjx.raycast import render
-from fingers_mjx.raycast_camera import Camera
-from fingers_mjx.raycast_shade import Look
+from fingers_mjx.pictures.camera import Camera
+from fingers_mjx.pictures.raycast import render
+from fingers_mjx.pictures.shade import Look
 
 Frame = UInt8[np.ndarray, "h w 3"]
 README_BYTES = 2_000_000

@@ -9,8 +9,8 @@ from PIL import Image
 
 from envs.hand.hand_file import load_hand_file
 from envs.hand.stance import load_stance
-from fingers_mjx import hand_show
 from fingers_mjx.cli.main import main
+from fingers_mjx.pictures import hand as hand_show
 
 
 @pytest.fixture(scope="module")

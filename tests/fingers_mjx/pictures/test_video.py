@@ -5,8 +5,8 @@ import pytest
 from PIL import Image
 
 from envs.errors import InputError
-from fingers_mjx.raycast_camera import Camera
-from fingers_mjx.video import follow, frames, write_animation, write_mp4
+from fingers_mjx.pictures.camera import Camera
+from fingers_mjx.pictures.video import follow, frames, write_animation, write_mp4
 
 BOX = """<mujoco><worldbody><geom type="plane" size="0 0 1"/><body pos="0 0 .1">
 <freejoint/><geom type="box" size=".05 .03 .02" rgba=".8 .2 .1 1"/></body>

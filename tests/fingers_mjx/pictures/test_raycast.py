@@ -2,9 +2,16 @@ import mujoco
 import numpy as np
 import pytest
 
-from fingers_mjx.raycast import cast, exact, geom_colours, lamps, render, seen_from
-from fingers_mjx.raycast_camera import Camera, pixel_centres, position, project, rays
-from fingers_mjx.raycast_shade import Look, checkerboard
+from fingers_mjx.pictures.camera import Camera, pixel_centres, position, project, rays
+from fingers_mjx.pictures.raycast import (
+    cast,
+    exact,
+    geom_colours,
+    lamps,
+    render,
+    seen_from,
+)
+from fingers_mjx.pictures.shade import Look, checkerboard
 
 SEED = 7
 HAND = """<mujoco><asset><material name="teal" rgba="0 .5 .5 1"/></asset><worldbody>

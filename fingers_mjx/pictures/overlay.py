@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from fingers_mjx.raycast_camera import Camera, project
+from fingers_mjx.pictures.camera import Camera, project
 
 Rgb = tuple[int, int, int]
 AXIS_COLOURS: tuple[Rgb, ...] = ((214, 39, 40), (44, 140, 60), (31, 90, 190))
