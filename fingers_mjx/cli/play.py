@@ -18,18 +18,18 @@ from fingers_mjx.evaluation.source import (
     with_command,
     without_practice,
 )
-from fingers_mjx.play import Player, Schedule
-from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
-from fingers_mjx.play_keyboard import TASK as KEYBOARD
-from fingers_mjx.play_keyboard import KeyPlayer, keys_story
-from fingers_mjx.play_keyboard_video import write_keyboard_video
-from fingers_mjx.play_recovery import (
+from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
+from fingers_mjx.play.keyboard import TASK as KEYBOARD
+from fingers_mjx.play.keyboard import KeyPlayer, keys_story
+from fingers_mjx.play.keyboard_video import write_keyboard_video
+from fingers_mjx.play.player import Player, Schedule
+from fingers_mjx.play.recovery import (
     RecoveryPlayer,
     check_chain,
     is_recovery,
     story,
 )
-from fingers_mjx.play_video import VIDEO_SUFFIXES, write_video
+from fingers_mjx.play.video import VIDEO_SUFFIXES, write_video
 from fingers_mjx.policy_source import PolicySource, load_bundle_setup
 from fingers_mjx.run_setup import Setup, make_env
 

@@ -5,8 +5,8 @@ import argparse
 from envs.errors import InputError, one_of
 from envs.tasks.keyboard.task import KeyboardConfig
 from fingers_deploy import Bundle
-from fingers_mjx.play_keyboard import TASK
-from fingers_mjx.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, Board, read_level
+from fingers_mjx.play.keyboard import TASK
+from fingers_mjx.play.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, Board, read_level
 from fingers_robot.behaviour.keys import ARROWS, KeyTimes
 
 LEVELS = {"one-box": ONE_BOX, "two-boxes": TWO_BOXES}

@@ -12,9 +12,9 @@ from fingers_mjx.evaluation.source import (
     nominal,
     write_evaluation,
 )
-from fingers_mjx.play import Player
-from fingers_mjx.play_episodes import Session, play_episodes, schedule_of
-from fingers_mjx.play_video import write_video
+from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
+from fingers_mjx.play.player import Player
+from fingers_mjx.play.video import write_video
 from fingers_mjx.policy_source import PolicySource
 from fingers_mjx.run_setup import make_env
 

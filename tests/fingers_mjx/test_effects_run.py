@@ -10,7 +10,7 @@ from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.drive.chain import ChainState
 from fingers_deploy import load_bundle
-from fingers_mjx.play import Player
+from fingers_mjx.play.player import Player
 from fingers_mjx.run_setup import make_env
 
 STEPS = 15

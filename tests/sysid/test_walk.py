@@ -15,10 +15,10 @@ from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli.diagnose_walk import walk_setup
 from fingers_mjx.cli.main import main
 from fingers_mjx.evaluation.source import nominal
-from fingers_mjx.play_episodes import schedule_of
+from fingers_mjx.play.episodes import schedule_of
+from fingers_mjx.play.log import WalkNoise, WalkRecorder
 from fingers_mjx.policy_source import load_bundle_setup
 from fingers_mjx.run_setup import make_env
-from fingers_mjx.walk_log import WalkNoise, WalkRecorder
 from sysid.data import make_log
 from sysid.data_read import write_log
 from sysid.walk_record import walk_record

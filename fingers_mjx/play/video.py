@@ -10,8 +10,8 @@ from jaxtyping import Float
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import caption
 from fingers_mjx.pictures.video import Frame, follow, frames, write_animation, write_mp4
-from fingers_mjx.play import Played
-from fingers_mjx.play_target import Target, target_of, with_target
+from fingers_mjx.play.player import Played
+from fingers_mjx.play.target import Target, target_of, with_target
 
 VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw
 
-from fingers_mjx.sokoban import Board
+from fingers_mjx.play.sokoban import Board
 
 Rgb = tuple[int, int, int]
 PAPER: Rgb = (246, 246, 243)

@@ -9,7 +9,7 @@ from envs.tasks.push.measures import ENTER_M, STAY_M
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import Line, draw
 from fingers_mjx.pictures.video import Frame
-from fingers_mjx.play import Played
+from fingers_mjx.play.player import Played
 
 Target = Float[np.ndarray, "2"] | None
 _ABOVE_FLOOR_M = 0.001

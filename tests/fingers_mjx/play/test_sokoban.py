@@ -5,7 +5,7 @@ from functools import reduce
 
 import pytest
 
-from fingers_mjx.sokoban import (
+from fingers_mjx.play.sokoban import (
     MOVES,
     ONE_BOX,
     SOLUTIONS,

@@ -10,11 +10,11 @@ from envs.tasks.keyboard.model import ARROWS, KEY_NAMES
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import caption
 from fingers_mjx.pictures.video import Frame, frames, write_animation, write_mp4
-from fingers_mjx.play import Played
-from fingers_mjx.play_keyboard import boards_of
-from fingers_mjx.play_video import frame_steps
-from fingers_mjx.sokoban import Board
-from fingers_mjx.sokoban_board import draw_panel
+from fingers_mjx.play.keyboard import boards_of
+from fingers_mjx.play.player import Played
+from fingers_mjx.play.sokoban import Board
+from fingers_mjx.play.sokoban_board import draw_panel
+from fingers_mjx.play.video import frame_steps
 
 VIEW = Camera(
     lookat_w=(0.11, 0.0, 0.05), distance_m=0.33, azimuth_deg=215.0, elevation_deg=-34.0
@@ -38,7 +38,7 @@ def write_keyboard_video(
     """Writes a film of an episode of the keyboard task.
 
     Args:
-        path: file to write, with one of `fingers_mjx.play_video.VIDEO_SUFFIXES`.
+        path: file to write, with one of `fingers_mjx.play.video.VIDEO_SUFFIXES`.
         model: the scene.
         played: the episode.
         dt_s: control interval [s].

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from envs.errors import InputError
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
-from fingers_mjx.play_upright import orientation_of
+from fingers_mjx.play.upright import orientation_of
 from fingers_robot.behaviour.command import DEADZONE, FixedCommand, Ranges
 from fingers_robot.behaviour.policies import Policies
 from fingers_robot.runtime.link import OBSERVATION, Answer, decode_answer

@@ -30,7 +30,7 @@ from envs.physics.base import nominal_field
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluation.record import Trace, record
-from fingers_mjx.play_inputs import PlayInputs
+from fingers_mjx.play.inputs import PlayInputs
 
 Schedule = Float[np.ndarray, "steps 3"]
 

@@ -17,12 +17,12 @@ from envs.tasks.keyboard.model import KEY_NAMES
 from fingers_deploy import load_bundle
 from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
 from fingers_mjx.evaluation.source import nominal
-from fingers_mjx.play_episodes import play_episodes
-from fingers_mjx.play_keyboard import KeyPlayer, KeysPlayed, boards_of, keys_story
-from fingers_mjx.play_keyboard_video import write_keyboard_video
+from fingers_mjx.play.episodes import play_episodes
+from fingers_mjx.play.keyboard import KeyPlayer, KeysPlayed, boards_of, keys_story
+from fingers_mjx.play.keyboard_video import write_keyboard_video
+from fingers_mjx.play.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
+from fingers_mjx.play.sokoban_board import draw_panel
 from fingers_mjx.run_setup import make_env, new_setup
-from fingers_mjx.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
-from fingers_mjx.sokoban_board import draw_panel
 from fingers_robot.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
 
 START = read_level(ONE_BOX)

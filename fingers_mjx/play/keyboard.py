@@ -21,8 +21,8 @@ from fingers_deploy import Bundle
 from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluation.record import Trace
-from fingers_mjx.play import Played, Player, Schedule
-from fingers_mjx.sokoban import Board, move
+from fingers_mjx.play.player import Played, Player, Schedule
+from fingers_mjx.play.sokoban import Board, move
 from fingers_robot.behaviour.keys import (
     ARROWS,
     KeyOutcome,

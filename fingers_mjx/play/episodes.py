@@ -9,7 +9,7 @@ import numpy as np
 from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, episode_table
 from fingers_mjx.evaluation.record import Trace
 from fingers_mjx.evaluation.source import hand_mass_kg
-from fingers_mjx.play import Played, Player, Schedule
+from fingers_mjx.play.player import Played, Player, Schedule
 
 
 @dataclass(frozen=True)

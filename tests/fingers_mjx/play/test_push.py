@@ -10,8 +10,8 @@ from support.cli_setup import TRAIN, make_bundle, random_weights
 from fingers_deploy import load_bundle
 from fingers_deploy.tracking import ObjectTracker
 from fingers_mjx.evaluation.source import with_command
-from fingers_mjx.play import Player
-from fingers_mjx.play_episodes import play_episodes
+from fingers_mjx.play.episodes import play_episodes
+from fingers_mjx.play.player import Player
 from fingers_mjx.run_setup import make_env, new_setup
 
 STEPS = 25

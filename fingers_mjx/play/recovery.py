@@ -11,8 +11,8 @@ from envs.errors import InputError
 from envs.memory import Memory
 from fingers_deploy import Bundle
 from fingers_deploy.policy import Runtime
-from fingers_mjx.play import Played, Player
-from fingers_mjx.play_behaviours import Behaviours
+from fingers_mjx.play.behaviours import Behaviours
+from fingers_mjx.play.player import Played, Player
 from fingers_robot.behaviour.policies import RECOVERY
 
 

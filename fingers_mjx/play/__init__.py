@@ -1,0 +1,1 @@
+"""An exported policy in C MuJoCo, through the robot's own code."""
