@@ -20,7 +20,7 @@ from fingers_mjx.evaluation.files import summary_document
 from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
 from fingers_mjx.evaluation.stats import paired_difference
-from fingers_mjx.policy_source import PolicySource
+from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.progress import OnProgress
 from fingers_mjx.report import commit_here
 from fingers_mjx.run_setup import Setup, identity, make_env

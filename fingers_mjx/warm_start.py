@@ -14,9 +14,9 @@ from envs.hand.figures import figures
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_deploy.manifest import Interface, Term
-from fingers_mjx.policy_interface import interface_of
+from fingers_mjx.policy.actor import warm_started
+from fingers_mjx.policy.interface import interface_of
 from fingers_mjx.ppo_brax import PPONetworkParams
-from fingers_mjx.ppo_policy import warm_started
 from fingers_mjx.ppo_state import TrainState
 
 COUNT = 200_000

@@ -22,7 +22,7 @@ from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import BundleError, load_bundle
 from fingers_mjx import checkpoint
 from fingers_mjx.evaluation.files import read_table, write_table
-from fingers_mjx.policy_source import load_source
+from fingers_mjx.policy.source import load_source
 from fingers_mjx.run_setup import run_setup
 from fingers_mjx.rundir_metrics import read_metrics
 

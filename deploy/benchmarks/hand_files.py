@@ -29,7 +29,7 @@ from fingers_deploy.manifest import (
 )
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
-from fingers_mjx.policy_interface import interface_of
+from fingers_mjx.policy.interface import interface_of
 
 WALKING = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 """The committed policy."""

@@ -21,7 +21,7 @@ from fingers_mjx.evaluation.source import (
     with_command,
     write_evaluation,
 )
-from fingers_mjx.policy_source import is_run, load_source
+from fingers_mjx.policy.source import is_run, load_source
 from fingers_mjx.run_setup import Setup, overridden
 
 

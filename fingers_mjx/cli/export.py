@@ -4,7 +4,7 @@ import argparse
 
 from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.export.run import export_run
-from fingers_mjx.policy_source import check_run
+from fingers_mjx.policy.source import check_run
 
 
 def run(args: argparse.Namespace) -> int:

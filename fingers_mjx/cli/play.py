@@ -30,7 +30,7 @@ from fingers_mjx.play.recovery import (
     story,
 )
 from fingers_mjx.play.video import VIDEO_SUFFIXES, write_video
-from fingers_mjx.policy_source import PolicySource, load_bundle_setup
+from fingers_mjx.policy.source import PolicySource, load_bundle_setup
 from fingers_mjx.run_setup import Setup, make_env
 
 

@@ -13,7 +13,7 @@ from envs.physics import default_backend
 from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.cli.train import check_backend
 from fingers_mjx.evaluation.files import write_atomic
-from fingers_mjx.policy_source import PolicySource, load_source
+from fingers_mjx.policy.source import PolicySource, load_source
 from fingers_mjx.ppo_config import preset
 from fingers_mjx.progress import reporter
 from fingers_mjx.run_setup import Setup, new_setup, overridden

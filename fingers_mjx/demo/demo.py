@@ -8,7 +8,7 @@ from fingers_mjx.demo.learn import LearnSize, default_size, learn
 from fingers_mjx.demo.report import write_demo_report
 from fingers_mjx.demo.screen import Screen
 from fingers_mjx.demo.show import ShowSize, show
-from fingers_mjx.policy_source import PolicySource, load_bundle_setup
+from fingers_mjx.policy.source import PolicySource, load_bundle_setup
 
 POLICY_DIR = Path(__file__).with_name("policies") / "crawl"
 """The committed crawl policy."""

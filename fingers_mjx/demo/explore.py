@@ -12,7 +12,7 @@ from envs.base import State
 from envs.batch import BatchEnv
 from envs.streams import stream
 from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
-from fingers_mjx.ppo_policy import Network, act
+from fingers_mjx.policy.actor import Network, act
 
 
 @dataclass(frozen=True)

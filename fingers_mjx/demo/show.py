@@ -15,7 +15,7 @@ from fingers_mjx.evaluation.source import (
 from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.video import write_video
-from fingers_mjx.policy_source import PolicySource
+from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.run_setup import make_env
 
 FILM = ((0.16, 0.0, 0.0), (0.10, 0.12, 0.0), (0.0, 0.0, 0.45), (0.16, 0.0, 0.0))

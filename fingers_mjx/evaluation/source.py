@@ -25,8 +25,8 @@ from fingers_mjx.evaluation.files import (
     write_table,
 )
 from fingers_mjx.evaluation.measures import CONTACT_N
-from fingers_mjx.policy_source import PolicySource
-from fingers_mjx.ppo_policy import act
+from fingers_mjx.policy.actor import act
+from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.report import commit_here
 from fingers_mjx.run_setup import Setup, make_env
 

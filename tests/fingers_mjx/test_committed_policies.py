@@ -9,8 +9,8 @@ import fingers_mjx
 from envs.registry import task_names
 from fingers_deploy import load_bundle, load_policy
 from fingers_deploy.bundle import check_parity
-from fingers_mjx.policy_interface import check_interface, interface_of
-from fingers_mjx.policy_source import load_source
+from fingers_mjx.policy.interface import check_interface, interface_of
+from fingers_mjx.policy.source import load_source
 from fingers_mjx.run_setup import make_env
 
 POLICIES = Path(fingers_mjx.__file__).parent / "policies"

@@ -22,7 +22,7 @@ from envs.errors import InputError
 from envs.settings import HandSettings
 from fingers_mjx import checkpoint
 from fingers_mjx.checkpoint_tree import to_host
-from fingers_mjx.ppo_policy import act, load_policy
+from fingers_mjx.policy.actor import act, load_policy
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Diverged, OutOfSpace
 from fingers_mjx.train_session import Session

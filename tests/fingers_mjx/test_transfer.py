@@ -52,7 +52,7 @@ def test_drift_is_what_happens_before_a_fall():
 
 
 def source(name, tmp_path):
-    from fingers_mjx.policy_source import load_source
+    from fingers_mjx.policy.source import load_source
 
     return load_source(make_bundle(tmp_path / name, make_setup()))
 

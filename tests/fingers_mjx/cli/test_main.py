@@ -13,7 +13,7 @@ from fingers_mjx import checkpoint
 from fingers_mjx.cli.main import main
 from fingers_mjx.demo.demo import POLICY_DIR
 from fingers_mjx.evaluation.files import read_table
-from fingers_mjx.policy_source import load_source
+from fingers_mjx.policy.source import load_source
 from fingers_mjx.rundir_metrics import read_metrics
 from fingers_mjx.train_errors import Diverged, Interrupted, OutOfSpace
 

@@ -16,7 +16,7 @@ from fingers_mjx.demo.demo import DemoSize
 from fingers_mjx.demo.explore import Exploring
 from fingers_mjx.demo.learn import LearnSize
 from fingers_mjx.demo.show import ShowSize
-from fingers_mjx.policy_source import load_source
+from fingers_mjx.policy.source import load_source
 
 SIZE = DemoSize(
     ShowSize(episodes=2, steps=60, film_s=0.4, fps=10, width=96),

@@ -21,7 +21,7 @@ from fingers_mjx.evaluation.source import (
     typical_episode,
     with_command,
 )
-from fingers_mjx.policy_source import PolicySource
+from fingers_mjx.policy.source import PolicySource
 
 
 def table(duration, speed):

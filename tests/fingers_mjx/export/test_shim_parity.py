@@ -14,7 +14,7 @@ from support.cli_setup import make_bundle, make_setup, random_weights
 from envs.commands import CommandConfig
 from envs.randomize import no_randomization
 from fingers_deploy import ActionTransform, PolicyController, load_bundle
-from fingers_mjx.ppo_policy import act
+from fingers_mjx.policy.actor import act
 from fingers_mjx.run_setup import make_env
 
 STEPS = 40

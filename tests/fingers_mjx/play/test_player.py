@@ -148,7 +148,7 @@ def test_a_fall_ends_the_episode_and_counts(setup, tmp_path):
 
 
 def test_joints_of_another_hand_are_refused(setup, tmp_path):
-    from fingers_mjx.policy_interface import interface_of
+    from fingers_mjx.policy.interface import interface_of
 
     env = make_env(setup, 1, "cpu")
     interface = interface_of(env)

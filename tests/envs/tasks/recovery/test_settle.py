@@ -12,7 +12,7 @@ from envs.hand.stance import stance_of
 from envs.registry import make_batch
 from envs.tasks.recovery.settle import Settle, action_toward, start_settling
 from fingers_deploy.rotations import conjugate, gravity, multiply
-from fingers_mjx.policy_interface import interface_of
+from fingers_mjx.policy.interface import interface_of
 from fingers_robot.behaviour.settle import settle_ramp
 from fingers_robot.behaviour.upright import tilt_angle, upright_step
 

@@ -9,7 +9,7 @@ import fingers_mjx
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
 from fingers_deploy import load_bundle
-from fingers_mjx.policy_interface import check_interface
+from fingers_mjx.policy.interface import check_interface
 
 COMMITTED = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 SPEEDS = tuple(load_hand_file().speed_limit.per_joint().tolist())

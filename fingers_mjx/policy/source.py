@@ -11,8 +11,8 @@ from envs.errors import InputError
 from envs.hand.figures import figures
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
-from fingers_mjx.policy_interface import check_interface, interface_of
-from fingers_mjx.ppo_policy import Network, load_policy
+from fingers_mjx.policy.actor import Network, load_policy
+from fingers_mjx.policy.interface import check_interface, interface_of
 from fingers_mjx.run_setup import (
     Setup,
     check_run_interface,
