@@ -16,8 +16,8 @@ from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.registry import get_task, make_batch
 from fingers_mjx.policy.interface import check_same, interface_of
-from fingers_mjx.ppo_config import TrainConfig
-from fingers_mjx.ppo_config_check import check_config
+from fingers_mjx.ppo.config import TrainConfig
+from fingers_mjx.ppo.config_check import check_config
 from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
 
 ENV_PREFIX = "env."

@@ -10,10 +10,10 @@ from envs.hand.hand_file import HandFile
 from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
-from fingers_mjx.ppo_config import TrainConfig, free_fields
-from fingers_mjx.ppo_config_check import check_config
-from fingers_mjx.ppo_rollout import BatchEnv
-from fingers_mjx.ppo_state import Carry, strong
+from fingers_mjx.ppo.config import TrainConfig, free_fields
+from fingers_mjx.ppo.config_check import check_config
+from fingers_mjx.ppo.rollout import BatchEnv
+from fingers_mjx.ppo.state import Carry, strong
 from fingers_mjx.progress import OnProgress, Ticker
 from fingers_mjx.rundir import check_bound, open_run, record_run
 from fingers_mjx.rundir_metrics import MetricsLog, read_metrics

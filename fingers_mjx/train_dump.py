@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from fingers_mjx.checkpoint_tree import to_host
-from fingers_mjx.ppo_state import Carry
+from fingers_mjx.ppo.state import Carry
 from fingers_mjx.rundir_files import write_whole
 
 LIMIT_BYTES = 50 * 2**20

@@ -10,8 +10,8 @@ from envs.config.typed import to_dict
 from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
-from fingers_mjx.ppo_state import Carry
-from fingers_mjx.ppo_totals import means
+from fingers_mjx.ppo.state import Carry
+from fingers_mjx.ppo.totals import means
 from fingers_mjx.progress import OnProgress, Ticker
 from fingers_mjx.rundir_metrics import MetricsLog
 from fingers_mjx.train_dump import dump_state

@@ -27,8 +27,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from fingers_mjx.ppo_config import TrainConfig
-from fingers_mjx.ppo_totals import means
+from fingers_mjx.ppo.config import TrainConfig
+from fingers_mjx.ppo.totals import means
 
 
 @dataclass

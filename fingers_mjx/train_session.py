@@ -11,18 +11,18 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State
 from envs.config.typed import to_dict
-from fingers_mjx.ppo import Iteration, make_iteration, repeat_iterations
-from fingers_mjx.ppo_config import TrainConfig, bound_fields
-from fingers_mjx.ppo_rollout import FAULTS, BatchEnv
-from fingers_mjx.ppo_state import (
+from fingers_mjx.ppo.config import TrainConfig, bound_fields
+from fingers_mjx.ppo.iteration import Iteration, make_iteration, repeat_iterations
+from fingers_mjx.ppo.rollout import FAULTS, BatchEnv
+from fingers_mjx.ppo.state import (
     Carry,
     TrainState,
     init_train_state,
     make_learner,
     strong,
 )
-from fingers_mjx.ppo_totals import Totals
-from fingers_mjx.ppo_update import watched_names
+from fingers_mjx.ppo.totals import Totals
+from fingers_mjx.ppo.update import watched_names
 
 HEALTH = (
     "worst_streak",

@@ -16,8 +16,8 @@ from fingers_deploy.bundle import POLICY_FILE
 from fingers_deploy.manifest import Interface, Term
 from fingers_mjx.policy.actor import warm_started
 from fingers_mjx.policy.interface import interface_of
-from fingers_mjx.ppo_brax import PPONetworkParams
-from fingers_mjx.ppo_state import TrainState
+from fingers_mjx.ppo.brax import PPONetworkParams
+from fingers_mjx.ppo.state import TrainState
 
 COUNT = 200_000
 """Observations that a bundle's normalizer counts as: new terms must soon be heard."""

@@ -68,7 +68,7 @@ def test_documents_name_no_place_of_one_machine(path):
 
 
 def test_settings_in_the_training_guide_exist():
-    from fingers_mjx.ppo_config import TrainConfig
+    from fingers_mjx.ppo.config import TrainConfig
     from fingers_mjx.run_setup import new_setup, overridden
 
     text = (ROOT / "docs" / "training.md").read_text("utf-8")
@@ -78,7 +78,7 @@ def test_settings_in_the_training_guide_exist():
 
 
 def test_presets_in_the_training_guide_are_those_of_the_code():
-    from fingers_mjx.ppo_config import PRESETS
+    from fingers_mjx.ppo.config import PRESETS
 
     text = (ROOT / "docs" / "training.md").read_text("utf-8")
     rows = re.findall(

@@ -18,7 +18,7 @@ from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy import load_bundle
 from fingers_mjx import checkpoint
 from fingers_mjx.policy.actor import load_policy
-from fingers_mjx.ppo_config import TrainConfig
+from fingers_mjx.ppo.config import TrainConfig
 from fingers_mjx.run_setup import load_setup
 
 ROOT = Path(__file__).parents[1]

@@ -56,9 +56,9 @@ def environment(batch: BatchEnv, repeat: int) -> Layer:
 def ppo(batch: BatchEnv, repeat: int) -> Layer:
     """Complete PPO iterations with the paper's networks, unroll and epochs."""
     del repeat
-    from fingers_mjx.ppo import compile_iterations, make_iteration
-    from fingers_mjx.ppo_config import PpoConfig
-    from fingers_mjx.ppo_state import init_train_state, make_learner
+    from fingers_mjx.ppo.config import PpoConfig
+    from fingers_mjx.ppo.iteration import compile_iterations, make_iteration
+    from fingers_mjx.ppo.state import init_train_state, make_learner
 
     config = PpoConfig()
     learner = make_learner(batch, config)

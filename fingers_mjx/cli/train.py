@@ -12,8 +12,8 @@ from envs.physics import BACKENDS, default_backend
 from envs.physics.quiet_mjx import WARP_INSTALLED
 from envs.registry import get_task, task_names
 from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.ppo_config import TrainConfig, preset
-from fingers_mjx.ppo_state import train_template
+from fingers_mjx.ppo.config import TrainConfig, preset
+from fingers_mjx.ppo.state import train_template
 from fingers_mjx.progress import reporter
 from fingers_mjx.run_setup import (
     Setup,

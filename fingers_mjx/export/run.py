@@ -19,7 +19,7 @@ from fingers_mjx.export.export import (
 from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import interface_of
-from fingers_mjx.ppo_state import make_learner, train_template
+from fingers_mjx.ppo.state import make_learner, train_template
 from fingers_mjx.run_setup import (
     Setup,
     check_run_interface,

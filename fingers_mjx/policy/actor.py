@@ -13,7 +13,7 @@ from jaxtyping import Array, Float
 from envs.errors import InputError
 from fingers_mjx import checkpoint
 from fingers_mjx.checkpoint import Saved
-from fingers_mjx.ppo_state import TrainState
+from fingers_mjx.ppo.state import TrainState
 
 _POLICY = "train/params/policy/params/"
 _NORMALIZER = "train/normalizer/"

@@ -7,7 +7,7 @@ import numpy as np
 
 from envs.base import State
 from fingers_mjx import train_dump
-from fingers_mjx.ppo_health import healthy
+from fingers_mjx.ppo.health import healthy
 from fingers_mjx.train_dump import dump_state
 
 

@@ -12,8 +12,8 @@ from envs.errors import InputError
 from envs.registry import make_batch
 from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import load_bundle
-from fingers_mjx.ppo_config import PpoConfig
-from fingers_mjx.ppo_state import init_train_state, make_learner, train_template
+from fingers_mjx.ppo.config import PpoConfig
+from fingers_mjx.ppo.state import init_train_state, make_learner, train_template
 from fingers_mjx.warm_start import COUNT, started_from
 
 CRAWL = Path(fingers_mjx.__file__).parent / "policies" / "crawl"

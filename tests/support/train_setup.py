@@ -15,7 +15,7 @@ from pathlib import Path
 from support.probe_envs import probe
 
 from fingers_mjx import checkpoint
-from fingers_mjx.ppo_config import PpoConfig, TrainConfig
+from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.rundir_metrics import read_metrics
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Interrupted

@@ -6,8 +6,8 @@ import pytest
 
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
-from fingers_mjx.ppo_config import PRESETS, TrainConfig, bound_fields, paper, preset
-from fingers_mjx.ppo_config_check import check_config
+from fingers_mjx.ppo.config import PRESETS, TrainConfig, bound_fields, paper, preset
+from fingers_mjx.ppo.config_check import check_config
 
 
 @pytest.mark.parametrize("name", PRESETS)

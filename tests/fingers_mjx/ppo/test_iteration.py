@@ -14,11 +14,11 @@ import pytest
 from brax.training.agents.ppo import networks
 from support.probe_envs import Fault, probe
 
-from fingers_mjx.ppo import compile_iterations, make_iteration
-from fingers_mjx.ppo_brax import make_networks
-from fingers_mjx.ppo_config import PpoConfig
-from fingers_mjx.ppo_state import init_train_state, make_learner, strong
-from fingers_mjx.ppo_totals import means
+from fingers_mjx.ppo.brax import make_networks
+from fingers_mjx.ppo.config import PpoConfig
+from fingers_mjx.ppo.iteration import compile_iterations, make_iteration
+from fingers_mjx.ppo.state import init_train_state, make_learner, strong
+from fingers_mjx.ppo.totals import means
 
 SMALL = PpoConfig(
     unroll_length=8,

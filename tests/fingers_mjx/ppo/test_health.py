@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from support.probe_envs import probe
 
-from fingers_mjx.ppo_brax import learning_rate
-from fingers_mjx.ppo_config import PpoConfig
-from fingers_mjx.ppo_health import (
+from fingers_mjx.ppo.brax import learning_rate
+from fingers_mjx.ppo.config import PpoConfig
+from fingers_mjx.ppo.health import (
     finite_terms,
     healthy,
     note_faults,
     record,
     term_names,
 )
-from fingers_mjx.ppo_rollout import Rollout
-from fingers_mjx.ppo_state import init_train_state, make_learner
-from fingers_mjx.ppo_update import improve, watched_names
+from fingers_mjx.ppo.rollout import Rollout
+from fingers_mjx.ppo.state import init_train_state, make_learner
+from fingers_mjx.ppo.update import improve, watched_names
 
 T, B = 2, 4
 CONFIG = PpoConfig(epochs=1, minibatches=1, actor_layers=(4,), critic_layers=(4,))

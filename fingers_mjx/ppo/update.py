@@ -10,16 +10,16 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Int, PRNGKeyArray
 
-from fingers_mjx.ppo_brax import (
+from fingers_mjx.ppo.brax import (
     Transition,
     adapt_learning_rate,
     learning_rate,
     update_normalizer,
 )
-from fingers_mjx.ppo_health import finite_terms, note_faults, record, term_names
-from fingers_mjx.ppo_rollout import Rollout
-from fingers_mjx.ppo_state import Learner, TrainState
-from fingers_mjx.ppo_totals import Totals, total
+from fingers_mjx.ppo.health import finite_terms, note_faults, record, term_names
+from fingers_mjx.ppo.rollout import Rollout
+from fingers_mjx.ppo.state import Learner, TrainState
+from fingers_mjx.ppo.totals import Totals, total
 
 LOSS_TERMS = {
     "policy_loss": "loss/policy",

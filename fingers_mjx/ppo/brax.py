@@ -1,7 +1,7 @@
 """The one module that imports Brax: its PPO networks, loss, rate and normalizer.
 
 Brax's own `ppo.train` is one function that cannot save or restore the whole training
-state, so the iteration (`fingers_mjx.ppo`) is built here from Brax's parts instead.
+state, so the iteration (`fingers_mjx.ppo.iteration`) is built here from Brax's parts instead.
 """
 
 import functools
@@ -20,7 +20,7 @@ from brax.training.types import Transition
 from flax import linen
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from fingers_mjx.ppo_config import PpoConfig
+from fingers_mjx.ppo.config import PpoConfig
 
 __all__ = [
     "PPONetworkParams",

@@ -2,7 +2,7 @@
 
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
-from fingers_mjx.ppo_config import TrainConfig
+from fingers_mjx.ppo.config import TrainConfig
 
 
 def check_config(config: TrainConfig, source: object = "configuration") -> None:

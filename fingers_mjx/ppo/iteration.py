@@ -3,7 +3,7 @@
 One iteration unrolls the policy in every world, makes epochs x minibatches clipped
 updates with a rate that follows the KL divergence, then updates the normalizer (after
 the updates, so that the divergence is measured with the statistics of the rollout).
-Networks, loss and rate are Brax's (`fingers_mjx.ppo_brax`).
+Networks, loss and rate are Brax's (`fingers_mjx.ppo.brax`).
 """
 
 from collections.abc import Callable
@@ -13,10 +13,10 @@ import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
 from envs.base import State
-from fingers_mjx.ppo_rollout import BatchEnv, unroll
-from fingers_mjx.ppo_state import Learner, TrainState
-from fingers_mjx.ppo_totals import Totals
-from fingers_mjx.ppo_update import improve
+from fingers_mjx.ppo.rollout import BatchEnv, unroll
+from fingers_mjx.ppo.state import Learner, TrainState
+from fingers_mjx.ppo.totals import Totals
+from fingers_mjx.ppo.update import improve
 
 Iteration = Callable[
     [TrainState, State, PRNGKeyArray],

@@ -10,13 +10,13 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from envs.base import State
 from envs.physics.room import ROOM
-from fingers_mjx.ppo_brax import (
+from fingers_mjx.ppo.brax import (
     PPONetworkParams,
     PPONetworks,
     RunningStatisticsState,
     sample_action,
 )
-from fingers_mjx.ppo_totals import Totals, count, total
+from fingers_mjx.ppo.totals import Totals, count, total
 
 
 @runtime_checkable

@@ -10,7 +10,7 @@ import optax
 from jaxtyping import Array, Int, PRNGKeyArray
 
 from envs.base import State
-from fingers_mjx.ppo_brax import (
+from fingers_mjx.ppo.brax import (
     PPONetworkParams,
     PPONetworks,
     RunningStatisticsState,
@@ -19,9 +19,9 @@ from fingers_mjx.ppo_brax import (
     make_networks,
     make_optimizer,
 )
-from fingers_mjx.ppo_config import PpoConfig
-from fingers_mjx.ppo_health import Health, healthy
-from fingers_mjx.ppo_rollout import BatchEnv, fixed_types
+from fingers_mjx.ppo.config import PpoConfig
+from fingers_mjx.ppo.health import Health, healthy
+from fingers_mjx.ppo.rollout import BatchEnv, fixed_types
 
 Loss = Callable[..., tuple[Array, dict[str, Array]]]
 

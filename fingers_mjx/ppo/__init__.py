@@ -1,0 +1,1 @@
+"""Proximal policy optimization as pure functions."""
