@@ -22,7 +22,7 @@ from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.progress import OnProgress
-from fingers_mjx.report import commit_here
+from fingers_mjx.reports.page import commit_here
 from fingers_mjx.run_setup import Setup, identity, make_env
 from fingers_mjx.train import Result, train
 

@@ -33,7 +33,7 @@ def run(args: argparse.Namespace) -> int:
     if mechanism.hand is not None and diagnosis.causes:
         save_hand_file(extended_hand(mechanism.hand, diagnosis), args.out / "hand.yaml")
     if not args.no_report:
-        from fingers_mjx.sysid_report import write_diagnosis_report
+        from fingers_mjx.reports.diagnosis import write_diagnosis_report
 
         write_diagnosis_report(args.out / "report.html", diagnosis, examined)
     print(f"{diagnosis.verdict}: {diagnosis.summary}")

@@ -5,11 +5,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fingers_mjx import figures, report
 from fingers_mjx.demo.learn import Learned
 from fingers_mjx.demo.show import FILM, Shown
 from fingers_mjx.evaluation.source import document, evaluation_figures
 from fingers_mjx.evaluation.stats import summarize
+from fingers_mjx.reports import figures
+from fingers_mjx.reports import page as report
 from fingers_mjx.rundir_metrics import read_metrics
 
 COMPARED = (

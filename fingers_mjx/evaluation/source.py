@@ -15,7 +15,6 @@ from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
 from envs.tasks.keyboard.task import KeyboardConfig
 from envs.tasks.keyboard.variation import nominal_keyboard
-from fingers_mjx import figures
 from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
 from fingers_mjx.evaluation.files import (
     SUMMARY_FILE,
@@ -27,7 +26,8 @@ from fingers_mjx.evaluation.files import (
 from fingers_mjx.evaluation.measures import CONTACT_N
 from fingers_mjx.policy.actor import act
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.report import commit_here
+from fingers_mjx.reports import figures
+from fingers_mjx.reports.page import commit_here
 from fingers_mjx.run_setup import Setup, make_env
 
 MAX_WORLDS = 4096

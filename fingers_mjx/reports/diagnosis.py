@@ -6,7 +6,14 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingers_mjx.report import Note, Picture, Section, Table, picture, write_report
+from fingers_mjx.reports.page import (
+    Note,
+    Picture,
+    Section,
+    Table,
+    picture,
+    write_report,
+)
 from sysid.diagnose import Examined
 from sysid.diagnose_forced import sample_rows
 from sysid.diagnose_loop import simulated

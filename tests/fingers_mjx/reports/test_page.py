@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from fingers_mjx.figures import gait_diagram
-from fingers_mjx.report import (
+from fingers_mjx.reports.figures import gait_diagram
+from fingers_mjx.reports.page import (
     Commands,
     Note,
     Picture,

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 
-from fingers_mjx.figures import (
+from fingers_mjx.reports.figures import (
     FINGER_COLOURS,
     foot_trajectories,
     gait_diagram,
