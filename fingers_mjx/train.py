@@ -7,7 +7,6 @@ from typing import Any
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
-from fingers_mjx import checkpoint
 from fingers_mjx.guard_signals import StopSignals
 from fingers_mjx.guard_watchdog import Watchdog
 from fingers_mjx.ppo.config import TrainConfig, free_fields
@@ -15,8 +14,9 @@ from fingers_mjx.ppo.config_check import check_config
 from fingers_mjx.ppo.rollout import BatchEnv
 from fingers_mjx.ppo.state import Carry, strong
 from fingers_mjx.progress import OnProgress, Ticker
-from fingers_mjx.rundir import check_bound, open_run, record_run
-from fingers_mjx.rundir_metrics import MetricsLog, read_metrics
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.directory import check_bound, open_run, record_run
+from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.train_cache import use_compile_cache
 from fingers_mjx.train_loop import Desk, Loop
 from fingers_mjx.train_session import Session, bound

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from fingers_mjx.checkpoint_tree import to_host
 from fingers_mjx.ppo.state import Carry
-from fingers_mjx.rundir_files import write_whole
+from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.tree import to_host
 
 LIMIT_BYTES = 50 * 2**20
 WORLDS = 16

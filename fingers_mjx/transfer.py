@@ -23,7 +23,7 @@ from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.progress import OnProgress
 from fingers_mjx.reports.page import commit_here
-from fingers_mjx.run_setup import Setup, identity, make_env
+from fingers_mjx.runs.setup import Setup, identity, make_env
 from fingers_mjx.train import Result, train
 
 MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")

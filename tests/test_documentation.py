@@ -69,7 +69,7 @@ def test_documents_name_no_place_of_one_machine(path):
 
 def test_settings_in_the_training_guide_exist():
     from fingers_mjx.ppo.config import TrainConfig
-    from fingers_mjx.run_setup import new_setup, overridden
+    from fingers_mjx.runs.setup import new_setup, overridden
 
     text = (ROOT / "docs" / "training.md").read_text("utf-8")
     (given,) = re.findall(r"`--set ([^`]+)`", text)

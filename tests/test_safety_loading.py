@@ -20,11 +20,11 @@ from envs.hand.importing.load import load_custom_hand
 from envs.hand.model import build_spec
 from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import BundleError, load_bundle
-from fingers_mjx import checkpoint
 from fingers_mjx.evaluation.files import read_table, write_table
 from fingers_mjx.policy.source import load_source
-from fingers_mjx.run_setup import run_setup
-from fingers_mjx.rundir_metrics import read_metrics
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.metrics import read_metrics
+from fingers_mjx.runs.setup import run_setup
 
 SEED = 20260119
 

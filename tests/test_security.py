@@ -16,10 +16,10 @@ from support.cli_setup import make_bundle, make_setup
 from envs.config.typed import load_yaml
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy import load_bundle
-from fingers_mjx import checkpoint
 from fingers_mjx.policy.actor import load_policy
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.run_setup import load_setup
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.setup import load_setup
 
 ROOT = Path(__file__).parents[1]
 SOURCES = ("rewards", "envs", "sysid", "fingers_mjx", "deploy", "benchmarks", "tests")

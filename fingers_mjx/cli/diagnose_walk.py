@@ -10,7 +10,7 @@ from envs.hand.hand_file import HandFile, save_hand_file
 from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.ppo.config import preset
-from fingers_mjx.run_setup import Setup, make_env, new_setup
+from fingers_mjx.runs.setup import Setup, make_env, new_setup
 from sysid.data import MeasuredLog
 from sysid.diagnose_hand import extended_hand
 from sysid.walk import diagnose_walk

@@ -22,7 +22,7 @@ from fingers_mjx.evaluation.source import (
     write_evaluation,
 )
 from fingers_mjx.policy.source import is_run, load_source
-from fingers_mjx.run_setup import Setup, overridden
+from fingers_mjx.runs.setup import Setup, overridden
 
 
 def run(args: argparse.Namespace) -> int:

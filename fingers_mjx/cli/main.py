@@ -60,7 +60,7 @@ def _status(error: Exception) -> int | None:
         return status
     from envs.errors import InputError
     from fingers_deploy import BundleError
-    from fingers_mjx.rundir_files import is_full
+    from fingers_mjx.runs.files import is_full
 
     if is_full(error):
         return DISK_FULL

@@ -31,7 +31,7 @@ from fingers_mjx.play.recovery import (
 )
 from fingers_mjx.play.video import VIDEO_SUFFIXES, write_video
 from fingers_mjx.policy.source import PolicySource, load_bundle_setup
-from fingers_mjx.run_setup import Setup, make_env
+from fingers_mjx.runs.setup import Setup, make_env
 
 
 def run(args: argparse.Namespace) -> int:

@@ -15,7 +15,7 @@ from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import train_template
 from fingers_mjx.progress import reporter
-from fingers_mjx.run_setup import (
+from fingers_mjx.runs.setup import (
     Setup,
     identity,
     make_env,

@@ -16,7 +16,7 @@ from fingers_mjx.export.run import export_run
 from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import init_train_state, make_learner
-from fingers_mjx.run_setup import Setup, identity, make_env, new_setup
+from fingers_mjx.runs.setup import Setup, identity, make_env, new_setup
 from fingers_mjx.train import train
 
 SEED = 1

@@ -11,7 +11,7 @@ from fingers_mjx.evaluation.source import document, evaluation_figures
 from fingers_mjx.evaluation.stats import summarize
 from fingers_mjx.reports import figures
 from fingers_mjx.reports import page as report
-from fingers_mjx.rundir_metrics import read_metrics
+from fingers_mjx.runs.metrics import read_metrics
 
 COMPARED = (
     "survival",

@@ -16,7 +16,7 @@ from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.video import write_video
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 FILM = ((0.16, 0.0, 0.0), (0.10, 0.12, 0.0), (0.0, 0.0, 0.45), (0.16, 0.0, 0.0))
 """Commands of the video: ahead, to the left, turning, ahead."""

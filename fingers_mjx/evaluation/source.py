@@ -28,7 +28,7 @@ from fingers_mjx.policy.actor import act
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures
 from fingers_mjx.reports.page import commit_here
-from fingers_mjx.run_setup import Setup, make_env
+from fingers_mjx.runs.setup import Setup, make_env
 
 MAX_WORLDS = 4096
 GAIT_S = 8.0

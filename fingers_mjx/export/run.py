@@ -7,7 +7,6 @@ from typing import Any
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
-from fingers_mjx.checkpoint import Saved
 from fingers_mjx.evaluation.files import SUMMARY_FILE, write_atomic
 from fingers_mjx.export.export import (
     Apply,
@@ -20,14 +19,15 @@ from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import interface_of
 from fingers_mjx.ppo.state import make_learner, train_template
-from fingers_mjx.run_setup import (
+from fingers_mjx.runs.checkpoint import Saved
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
+from fingers_mjx.runs.setup import (
     Setup,
     check_run_interface,
     config_digest,
     make_env,
     run_setup,
 )
-from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
 
 
 def export_run(run_dir: Path, out_dir: Path) -> ExportReport:

@@ -11,9 +11,9 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.errors import InputError
-from fingers_mjx import checkpoint
-from fingers_mjx.checkpoint import Saved
 from fingers_mjx.ppo.state import TrainState
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.checkpoint import Saved
 
 _POLICY = "train/params/policy/params/"
 _NORMALIZER = "train/normalizer/"

@@ -13,7 +13,8 @@ from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import check_interface, interface_of
-from fingers_mjx.run_setup import (
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE
+from fingers_mjx.runs.setup import (
     Setup,
     check_run_interface,
     config_digest,
@@ -21,7 +22,6 @@ from fingers_mjx.run_setup import (
     make_env,
     run_setup,
 )
-from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE
 
 
 @dataclass(frozen=True)

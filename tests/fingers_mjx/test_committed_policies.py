@@ -11,7 +11,7 @@ from fingers_deploy import load_bundle, load_policy
 from fingers_deploy.bundle import check_parity
 from fingers_mjx.policy.interface import check_interface, interface_of
 from fingers_mjx.policy.source import load_source
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 POLICIES = Path(fingers_mjx.__file__).parent / "policies"
 FOLDERS = sorted(path for path in POLICIES.iterdir() if path.is_dir())

@@ -11,7 +11,7 @@ from support.cli_setup import make_bundle, make_setup
 from envs.hand.drive.chain import ChainState
 from fingers_deploy import load_bundle
 from fingers_mjx.play.player import Player
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 STEPS = 15
 KEY = jax.random.key(7)

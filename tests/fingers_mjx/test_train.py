@@ -20,9 +20,9 @@ from support.train_setup import assert_same_end, curve, leaves, make_env, run
 
 from envs.errors import InputError
 from envs.settings import HandSettings
-from fingers_mjx import checkpoint
-from fingers_mjx.checkpoint_tree import to_host
 from fingers_mjx.policy.actor import act, load_policy
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.tree import to_host
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Diverged, OutOfSpace
 from fingers_mjx.train_session import Session

@@ -17,7 +17,7 @@ import pytest
 from support import train_setup
 from support.train_setup import assert_same_end, curve, leaves, run
 
-from fingers_mjx import checkpoint
+from fingers_mjx.runs import checkpoint
 from fingers_mjx.train_errors import Interrupted
 
 SCRIPT = Path(train_setup.__file__)

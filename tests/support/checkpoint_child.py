@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fingers_mjx import checkpoint
+from fingers_mjx.runs import checkpoint
 
 PROTOCOL = (
     "begin",

@@ -9,14 +9,14 @@ import numpy as np
 
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy.manifest import Normalizer, Provenance
-from fingers_mjx import checkpoint
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.interface import interface_of
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.ppo.state import init_train_state, make_learner
-from fingers_mjx.run_setup import Setup, config_digest, identity, make_env, new_setup
-from fingers_mjx.rundir import open_run, record_run
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.directory import open_run, record_run
+from fingers_mjx.runs.setup import Setup, config_digest, identity, make_env, new_setup
 from fingers_mjx.train_session import bound
 
 ROOT = Path(__file__).parents[1]

@@ -14,9 +14,9 @@ from pathlib import Path
 
 from support.probe_envs import probe
 
-from fingers_mjx import checkpoint
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
-from fingers_mjx.rundir_metrics import read_metrics
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.metrics import read_metrics
 from fingers_mjx.train import train
 from fingers_mjx.train_errors import Interrupted
 

@@ -18,7 +18,7 @@ from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play.episodes import schedule_of
 from fingers_mjx.play.log import WalkNoise, WalkRecorder
 from fingers_mjx.policy.source import load_bundle_setup
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 from sysid.data import make_log
 from sysid.data_read import write_log
 from sysid.walk_record import walk_record

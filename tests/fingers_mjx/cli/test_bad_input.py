@@ -11,7 +11,7 @@ from support.cli_setup import contents, make_bundle, make_run, make_setup
 from fingers_deploy.manifest import Interface
 from fingers_mjx.cli.main import main
 from fingers_mjx.policy.interface import interface_of
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 
 @pytest.fixture(scope="module")

@@ -9,12 +9,12 @@ from support.cli_setup import make_run, make_setup
 
 from envs.hand.hand_file import DEFAULT_HAND_FILE
 from envs.hand.stance import load_stance
-from fingers_mjx import checkpoint
 from fingers_mjx.cli.main import main
 from fingers_mjx.demo.demo import POLICY_DIR
 from fingers_mjx.evaluation.files import read_table
 from fingers_mjx.policy.source import load_source
-from fingers_mjx.rundir_metrics import read_metrics
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.metrics import read_metrics
 from fingers_mjx.train_errors import Diverged, Interrupted, OutOfSpace
 
 TINY = [

@@ -15,7 +15,7 @@ from envs.commands import CommandConfig
 from envs.randomize import no_randomization
 from fingers_deploy import ActionTransform, PolicyController, load_bundle
 from fingers_mjx.policy.actor import act
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 STEPS = 40
 TOLERANCE = 1e-6

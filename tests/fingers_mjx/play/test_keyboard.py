@@ -22,7 +22,7 @@ from fingers_mjx.play.keyboard import KeyPlayer, KeysPlayed, boards_of, keys_sto
 from fingers_mjx.play.keyboard_video import write_keyboard_video
 from fingers_mjx.play.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
 from fingers_mjx.play.sokoban_board import draw_panel
-from fingers_mjx.run_setup import make_env, new_setup
+from fingers_mjx.runs.setup import make_env, new_setup
 from fingers_robot.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
 
 START = read_level(ONE_BOX)

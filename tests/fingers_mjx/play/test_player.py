@@ -14,7 +14,7 @@ from fingers_mjx.evaluation.source import nominal, with_command
 from fingers_mjx.play.episodes import play_episodes, schedule_of
 from fingers_mjx.play.player import Player, varied_model
 from fingers_mjx.play.video import frame_steps
-from fingers_mjx.run_setup import make_env
+from fingers_mjx.runs.setup import make_env
 
 STEPS = 30
 KEY = jax.random.key(7)

@@ -12,7 +12,7 @@ from fingers_deploy.tracking import ObjectTracker
 from fingers_mjx.evaluation.source import with_command
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
-from fingers_mjx.run_setup import make_env, new_setup
+from fingers_mjx.runs.setup import make_env, new_setup
 
 STEPS = 25
 KEY = jax.random.key(3)

@@ -20,7 +20,7 @@ from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.recovery import RecoveryPlayer, check_chain, story
 from fingers_mjx.play.upright import orientation_of
-from fingers_mjx.run_setup import make_env, new_setup
+from fingers_mjx.runs.setup import make_env, new_setup
 from fingers_robot.behaviour.command import stick_command
 
 SEED = 20260125

@@ -17,15 +17,15 @@ import numpy as np
 import orbax.checkpoint as ocp
 
 from envs.errors import InputError
-from fingers_mjx import checkpoint_manifest as manifest
-from fingers_mjx.checkpoint_tree import (
+from fingers_mjx.runs import seal as manifest
+from fingers_mjx.runs.files import room_for
+from fingers_mjx.runs.tree import (
     check_layout,
     describe,
     from_host,
     leaf_names,
     to_host,
 )
-from fingers_mjx.rundir_files import room_for
 from fingers_mjx.train_errors import OutOfSpace
 
 _TMP, _OLD = ".tmp-", ".old-"

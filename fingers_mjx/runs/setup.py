@@ -18,7 +18,7 @@ from envs.registry import get_task, make_batch
 from fingers_mjx.policy.interface import check_same, interface_of
 from fingers_mjx.ppo.config import TrainConfig
 from fingers_mjx.ppo.config_check import check_config
-from fingers_mjx.rundir import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
 
 ENV_PREFIX = "env."
 INTERFACE = "interface"

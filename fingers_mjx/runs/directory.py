@@ -23,7 +23,7 @@ from typing import Any, TypeVar
 from envs.config.typed import dump_yaml, load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, hand_yaml
-from fingers_mjx.rundir_files import write_whole
+from fingers_mjx.runs.files import write_whole
 
 T = TypeVar("T")
 FORMAT = 1

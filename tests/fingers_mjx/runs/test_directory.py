@@ -8,11 +8,11 @@ import pytest
 from tensorboardX.proto.event_pb2 import Event
 
 from envs.errors import InputError
-from fingers_mjx import rundir_files
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.rundir import check_bound, open_run, record_run, saved_config
-from fingers_mjx.rundir_files import write_whole
-from fingers_mjx.rundir_metrics import MetricsLog, read_metrics
+from fingers_mjx.runs import files as rundir_files
+from fingers_mjx.runs.directory import check_bound, open_run, record_run, saved_config
+from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.train_errors import OutOfSpace
 
 

@@ -21,8 +21,9 @@ import pytest
 from support import checkpoint_child
 
 from envs.errors import InputError
-from fingers_mjx import checkpoint, rundir_files
-from fingers_mjx.checkpoint_tree import to_host
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs import files as rundir_files
+from fingers_mjx.runs.tree import to_host
 from fingers_mjx.train_errors import OutOfSpace
 
 POINTS = checkpoint_child.PROTOCOL

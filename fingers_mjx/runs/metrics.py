@@ -11,7 +11,7 @@ from tensorboardX.proto.event_pb2 import Event  # pyright: ignore
 from tensorboardX.proto.summary_pb2 import Summary  # pyright: ignore
 from tensorboardX.record_writer import RecordWriter
 
-from fingers_mjx.rundir_files import room_for, write_whole
+from fingers_mjx.runs.files import room_for, write_whole
 
 Row = Mapping[str, Any]
 _STEP, _TIME = "iteration", "time_s"
