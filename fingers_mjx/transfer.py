@@ -21,10 +21,10 @@ from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.progress import OnProgress
 from fingers_mjx.reports.page import commit_here
 from fingers_mjx.runs.setup import Setup, identity, make_env
-from fingers_mjx.train import Result, train
+from fingers_mjx.training.progress import OnProgress
+from fingers_mjx.training.train import Result, train
 
 MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")
 """Of episodes with the task's own commands."""

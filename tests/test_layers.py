@@ -62,7 +62,7 @@ def test_imports_point_down(package):
     ("package", "source", "found"),
     [
         ("rewards", "def f():\n    from envs.base import State", ["envs"]),
-        ("envs", "import fingers_mjx.train", ["fingers_mjx"]),
+        ("envs", "import fingers_mjx.training.train", ["fingers_mjx"]),
         ("envs", "import mujoco, rewards", []),
         ("rewards", "import mujoco", ["mujoco"]),
         ("fingers_deploy", "import jax", ["jax"]),

@@ -8,7 +8,7 @@ from fingers_mjx.cli.output import counting
 from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.demo.demo import POLICY_DIR, demo
 from fingers_mjx.demo.screen import Screen
-from fingers_mjx.progress import reporter
+from fingers_mjx.training.progress import reporter
 
 
 def run(args: argparse.Namespace) -> int:

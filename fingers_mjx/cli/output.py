@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from fingers_mjx.progress import Event, Ticker
+from fingers_mjx.training.progress import Event, Ticker
 
 LINE_EVERY_S = 5.0
 """Time between two lines where they are kept [s]."""

@@ -14,7 +14,6 @@ from envs.registry import get_task, task_names
 from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import train_template
-from fingers_mjx.progress import reporter
 from fingers_mjx.runs.setup import (
     Setup,
     identity,
@@ -23,8 +22,9 @@ from fingers_mjx.runs.setup import (
     overridden,
     run_setup,
 )
-from fingers_mjx.train import train
-from fingers_mjx.warm_start import started_from
+from fingers_mjx.training.progress import reporter
+from fingers_mjx.training.train import train
+from fingers_mjx.training.warm_start import started_from
 
 _FOR_NEW_RUNS = ("hand", "out", "warm_start")
 

@@ -15,8 +15,8 @@ from fingers_mjx.cli.train import check_backend
 from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.policy.source import PolicySource, load_source
 from fingers_mjx.ppo.config import preset
-from fingers_mjx.progress import reporter
 from fingers_mjx.runs.setup import Setup, new_setup, overridden
+from fingers_mjx.training.progress import reporter
 from fingers_mjx.transfer import compared, in_real_hand, train_on
 
 NAMES: tuple[str, str] = ("default", "extended")

@@ -17,7 +17,7 @@ from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import init_train_state, make_learner
 from fingers_mjx.runs.setup import Setup, identity, make_env, new_setup
-from fingers_mjx.train import train
+from fingers_mjx.training.train import train
 
 SEED = 1
 """Of the worlds in which both policies are measured; training has seed 0."""

@@ -6,7 +6,7 @@ from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from fingers_mjx.evaluation.evaluate import Progress
-from fingers_mjx.progress import OnProgress
+from fingers_mjx.training.progress import OnProgress
 
 
 @dataclass(frozen=True)

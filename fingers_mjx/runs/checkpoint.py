@@ -26,7 +26,7 @@ from fingers_mjx.runs.tree import (
     leaf_names,
     to_host,
 )
-from fingers_mjx.train_errors import OutOfSpace
+from fingers_mjx.training.errors import OutOfSpace
 
 _TMP, _OLD = ".tmp-", ".old-"
 _MARGIN_BYTES = 1 << 20

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from fingers_mjx.train_errors import OutOfSpace
+from fingers_mjx.training.errors import OutOfSpace
 
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 

@@ -17,7 +17,7 @@ from fingers_mjx.ppo.state import init_train_state, make_learner
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import open_run, record_run
 from fingers_mjx.runs.setup import Setup, config_digest, identity, make_env, new_setup
-from fingers_mjx.train_session import bound
+from fingers_mjx.training.session import bound
 
 ROOT = Path(__file__).parents[1]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))

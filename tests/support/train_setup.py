@@ -17,8 +17,8 @@ from support.probe_envs import probe
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.metrics import read_metrics
-from fingers_mjx.train import train
-from fingers_mjx.train_errors import Interrupted
+from fingers_mjx.training.errors import Interrupted
+from fingers_mjx.training.train import train
 
 ROOT = Path(__file__).parents[1]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))

@@ -15,7 +15,7 @@ from fingers_mjx.evaluation.files import read_table
 from fingers_mjx.policy.source import load_source
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.metrics import read_metrics
-from fingers_mjx.train_errors import Diverged, Interrupted, OutOfSpace
+from fingers_mjx.training.errors import Diverged, Interrupted, OutOfSpace
 
 TINY = [
     "num_envs=4",

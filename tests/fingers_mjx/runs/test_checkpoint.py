@@ -24,7 +24,7 @@ from envs.errors import InputError
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs import files as rundir_files
 from fingers_mjx.runs.tree import to_host
-from fingers_mjx.train_errors import OutOfSpace
+from fingers_mjx.training.errors import OutOfSpace
 
 POINTS = checkpoint_child.PROTOCOL
 

@@ -13,7 +13,7 @@ from fingers_mjx.runs import files as rundir_files
 from fingers_mjx.runs.directory import check_bound, open_run, record_run, saved_config
 from fingers_mjx.runs.files import write_whole
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
-from fingers_mjx.train_errors import OutOfSpace
+from fingers_mjx.training.errors import OutOfSpace
 
 
 @dataclass(frozen=True)

@@ -7,18 +7,18 @@ from pathlib import Path
 from typing import Any
 
 from envs.config.typed import to_dict
-from fingers_mjx.guard_signals import StopSignals
-from fingers_mjx.guard_watchdog import Watchdog
 from fingers_mjx.ppo.state import Carry
 from fingers_mjx.ppo.totals import means
-from fingers_mjx.progress import OnProgress, Ticker
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.metrics import MetricsLog
-from fingers_mjx.train_dump import dump_state
-from fingers_mjx.train_errors import Diverged, Interrupted
-from fingers_mjx.train_room import overflows
-from fingers_mjx.train_row import Window, speed
-from fingers_mjx.train_session import Report, Session
+from fingers_mjx.training.dump import dump_state
+from fingers_mjx.training.errors import Diverged, Interrupted
+from fingers_mjx.training.progress import OnProgress, Ticker
+from fingers_mjx.training.room import overflows
+from fingers_mjx.training.row import Window, speed
+from fingers_mjx.training.session import Report, Session
+from fingers_mjx.training.signals import StopSignals
+from fingers_mjx.training.watchdog import Watchdog
 
 
 @dataclass(frozen=True)

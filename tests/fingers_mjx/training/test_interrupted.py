@@ -18,7 +18,7 @@ from support import train_setup
 from support.train_setup import assert_same_end, curve, leaves, run
 
 from fingers_mjx.runs import checkpoint
-from fingers_mjx.train_errors import Interrupted
+from fingers_mjx.training.errors import Interrupted
 
 SCRIPT = Path(train_setup.__file__)
 

@@ -7,9 +7,10 @@ import time
 
 import pytest
 
-from fingers_mjx import guard_signals, guard_watchdog
-from fingers_mjx.guard_signals import StopSignals
-from fingers_mjx.guard_watchdog import Watchdog
+from fingers_mjx.training import signals as guard_signals
+from fingers_mjx.training import watchdog as guard_watchdog
+from fingers_mjx.training.signals import StopSignals
+from fingers_mjx.training.watchdog import Watchdog
 
 
 def wait_for(condition, limit_s=5.0):

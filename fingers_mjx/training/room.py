@@ -16,7 +16,7 @@ def overflows(
     """Yields an error for each buffer that was too small.
 
     Args:
-        figures: of one or more iterations, see `fingers_mjx.train_row`.
+        figures: of one or more iterations, see `fingers_mjx.training.row`.
         when: the iterations, for the sentence.
         num_envs: worlds of the run.
         config: settings of the task.

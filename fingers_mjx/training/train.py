@@ -7,20 +7,20 @@ from typing import Any
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
-from fingers_mjx.guard_signals import StopSignals
-from fingers_mjx.guard_watchdog import Watchdog
 from fingers_mjx.ppo.config import TrainConfig, free_fields
 from fingers_mjx.ppo.config_check import check_config
 from fingers_mjx.ppo.rollout import BatchEnv
 from fingers_mjx.ppo.state import Carry, strong
-from fingers_mjx.progress import OnProgress, Ticker
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
-from fingers_mjx.train_cache import use_compile_cache
-from fingers_mjx.train_loop import Desk, Loop
-from fingers_mjx.train_session import Session, bound
-from fingers_mjx.warm_start import started_from
+from fingers_mjx.training.compile_cache import use_compile_cache
+from fingers_mjx.training.loop import Desk, Loop
+from fingers_mjx.training.progress import OnProgress, Ticker
+from fingers_mjx.training.session import Session, bound
+from fingers_mjx.training.signals import StopSignals
+from fingers_mjx.training.warm_start import started_from
+from fingers_mjx.training.watchdog import Watchdog
 
 TICK_S = 1.0
 """Time between two reports of compilation."""
@@ -66,10 +66,10 @@ def train(
         hand: written beside both.
         resume: go on from the newest intact checkpoint.
         warm_start: run directory, checkpoint or bundle whose networks the new run
-            starts from (`fingers_mjx.warm_start`); everything else starts afresh.
+            starts from (`fingers_mjx.training.warm_start`); everything else starts afresh.
         identity: JSON-able facts that a resumed run must share besides configuration
             and sizes, such as the hash of the model and the order of observations.
-        on_progress: told the events of `fingers_mjx.progress`, from any thread.
+        on_progress: told the events of `fingers_mjx.training.progress`, from any thread.
 
     Raises:
         InputError: for settings, directories or checkpoints that do not fit, or when

@@ -7,8 +7,8 @@ import time
 import pytest
 from rich.console import Console
 
-from fingers_mjx.progress import QUIET_S, Ticker, reporter
-from fingers_mjx.progress_table import Board, clock
+from fingers_mjx.training.progress import QUIET_S, Ticker, reporter
+from fingers_mjx.training.progress_table import Board, clock
 
 ROW = {
     "event": "progress",

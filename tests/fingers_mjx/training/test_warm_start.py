@@ -14,7 +14,7 @@ from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import load_bundle
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.state import init_train_state, make_learner, train_template
-from fingers_mjx.warm_start import COUNT, started_from
+from fingers_mjx.training.warm_start import COUNT, started_from
 
 CRAWL = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 NETWORK = load_bundle(CRAWL).network

@@ -3,7 +3,7 @@
 A run reports events, dicts with the key "event":
 
     compiling    elapsed_s
-    progress     one row of metrics (see `fingers_mjx.train_row`)
+    progress     one row of metrics (see `fingers_mjx.training.row`)
     checkpoint   path, iteration
     note         text, one sentence
 """
@@ -19,7 +19,7 @@ from typing import Any, TextIO
 from rich.console import Console
 from rich.live import Live
 
-from fingers_mjx.progress_table import Board
+from fingers_mjx.training.progress_table import Board
 
 Event = Mapping[str, Any]
 OnProgress = Callable[[Event], None]

@@ -6,9 +6,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.base import State
-from fingers_mjx import train_dump
 from fingers_mjx.ppo.health import healthy
-from fingers_mjx.train_dump import dump_state
+from fingers_mjx.training import dump as train_dump
+from fingers_mjx.training.dump import dump_state
 
 
 def carry(worlds, width):

@@ -23,10 +23,10 @@ from envs.settings import HandSettings
 from fingers_mjx.policy.actor import act, load_policy
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.tree import to_host
-from fingers_mjx.train import train
-from fingers_mjx.train_errors import Diverged, OutOfSpace
-from fingers_mjx.train_session import Session
-from fingers_mjx.warm_start import started_from
+from fingers_mjx.training.errors import Diverged, OutOfSpace
+from fingers_mjx.training.session import Session
+from fingers_mjx.training.train import train
+from fingers_mjx.training.warm_start import started_from
 
 
 @pytest.fixture(scope="module")

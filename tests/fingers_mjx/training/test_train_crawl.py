@@ -15,7 +15,7 @@ from envs.errors import InputError
 from envs.physics import default_backend
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.runs.setup import identity, make_env, new_setup
-from fingers_mjx.train import train
+from fingers_mjx.training.train import train
 
 ITERATIONS = 4
 TRAIN = TrainConfig(

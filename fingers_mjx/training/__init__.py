@@ -1,0 +1,1 @@
+"""The training loop: from a run directory to a trained policy."""
