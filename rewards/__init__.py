@@ -48,7 +48,6 @@ from rewards.keyboard import (
     support_contact,
     support_drift,
 )
-from rewards.keyboard_table import KEYBOARD
 from rewards.lift import (
     LiftMemory,
     LiftParams,
@@ -66,13 +65,14 @@ from rewards.pushing import (
     object_reached,
     object_regress,
 )
-from rewards.pushing_table import PUSH
-from rewards.recovery_table import RECOVERY
 from rewards.schedules import Constant, GeometricDecay, Schedule, StepSwitch
 from rewards.shaping import safe_norm, smoothstep, tracking_kernel
 from rewards.smoothness import action_rate
 from rewards.stance import level_height, palm_tilt, stance_height, stance_pose
-from rewards.tables import CRAWL, STOCK
+from rewards.tables.crawl import CRAWL, STOCK
+from rewards.tables.keyboard import KEYBOARD
+from rewards.tables.push import PUSH
+from rewards.tables.recovery import RECOVERY
 from rewards.tracking import track_planar_velocity, track_yaw_rate
 
 __all__ = [

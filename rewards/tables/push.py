@@ -19,7 +19,7 @@ from rewards.pushing import (
     object_reached,
     object_regress,
 )
-from rewards.tables import CRAWL
+from rewards.tables.crawl import CRAWL
 from rewards.tracking import track_yaw_rate
 
 _WALK: RewardTable = tuple(row for row in CRAWL if row.name != "track_yaw_rate")
