@@ -23,8 +23,8 @@ from envs.hand.hand_file import HandFile, JointQuantity, Quantity
 from sysid.calibrate_friction import Pull, is_pull, pull_of
 from sysid.calibrate_joint import JointFit, fit_joint
 from sysid.data import MeasuredLog
-from sysid.diagnosis import Estimate
 from sysid.mechanism import Mechanism
+from sysid.result import Estimate
 
 _PULL = ("source", "finger", "normal_n", "friction", "deviation", "start_s", "stop_s")
 

@@ -17,7 +17,7 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.calibrate_record import BLOCK_S, STEP_S, Record
-from sysid.calibrate_search import Search
+from sysid.search_fit import Search
 
 SERVO = slice(0, 5)
 """Parameters of the servo; after them inertia, weight, dry and viscous friction."""

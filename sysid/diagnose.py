@@ -23,8 +23,8 @@ from sysid.diagnose_search import Search, search
 from sysid.diagnose_space import make_space
 from sysid.diagnose_tracks import JointTrack, all_tracks
 from sysid.diagnose_verdict import verdict_of
-from sysid.diagnosis import Diagnosis
 from sysid.mechanism import Mechanism
+from sysid.result import Diagnosis
 
 LEAST_MOTION = 2e-3
 """Least range of a target in which something can be seen [rad or m]."""

@@ -11,7 +11,7 @@ from sysid.diagnose_model import Model, fit_models
 from sysid.diagnose_problem import Problem
 from sysid.diagnose_search import Search
 from sysid.diagnose_space import SIGMA, Space
-from sysid.diagnosis import Gain
+from sysid.result import Gain
 
 BLOCKS = 24
 DRAWS = 400

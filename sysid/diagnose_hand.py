@@ -7,8 +7,8 @@ import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, HandFile, JointQuantity, Quantity
-from sysid.diagnosis import Cause, Diagnosis, Estimate
 from sysid.mechanism import Mechanism, hand_mechanism
+from sysid.result import Cause, Diagnosis, Estimate
 
 _FIGURES = {
     "transport_delay": ("delay_s", "delay_s"),

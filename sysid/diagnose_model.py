@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from sysid.diagnose_loud import loudness
 from sysid.diagnose_problem import Problem
-from sysid.fit import Fit, Task, fit_all
+from sysid.least_squares import Fit, Task, fit_all
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from envs.errors import InputError, one_of
+from sysid.bodies import bodies_along
 from sysid.data import MeasuredLog
-from sysid.diagnose_bodies import bodies_along
 from sysid.diagnose_checks import check_records
 from sysid.diagnose_doubt import sampling_doubt, timing_doubt
 from sysid.diagnose_forced import BAND_STEPS, EVERY, Track, sample_rows

@@ -18,8 +18,8 @@ from sysid.diagnose_space import Slot
 from sysid.diagnose_stage import NEARLY, NESTED
 from sysid.diagnose_words import next_experiment, summary_of, warnings_of
 from sysid.diagnose_worth import THRESHOLD
-from sysid.diagnosis import Alternative, Cause, Estimate, Gain
 from sysid.mechanism import Mechanism
+from sysid.result import Alternative, Cause, Estimate, Gain
 
 WIDER = 2.5
 """Half the width of a 95 % interval in deviations; measured on other hidden cases."""

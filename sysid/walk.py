@@ -20,9 +20,9 @@ from jaxtyping import Float, Int
 
 from envs.actuator.effects.mount_tilt import tilted
 from envs.batch import BatchEnv
-from sysid.calibrate_search import Search
 from sysid.data import MeasuredLog
-from sysid.diagnosis import Diagnosis
+from sysid.result import Diagnosis
+from sysid.search_fit import Search
 from sysid.walk_record import walk_record
 from sysid.walk_simulation import LOOKS, PIECE_STEPS, Pieces
 from sysid.walk_space import Hypothesis, axes, candidate, hypotheses

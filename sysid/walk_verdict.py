@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis import Alternative, Cause, Estimate, Gain
+from sysid.result import Alternative, Cause, Estimate, Gain
 from sysid.walk_space import Axis, Hypothesis
 
 SURE = 3.0

@@ -26,9 +26,9 @@ from scipy.signal import lfilter
 
 from sysid.calibrate_motion import Motion
 from sysid.calibrate_record import joint_record
-from sysid.calibrate_search import Search
 from sysid.data import MeasuredLog, make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
+from sysid.search_fit import Search
 
 RATE_HZ, STEP_S, FINE_S = 500.0, 0.001, 0.000125
 CUTOFF_HZ = 20.0

@@ -17,7 +17,7 @@ from fingers_mjx.reports.page import (
 from sysid.diagnose import Examined
 from sysid.diagnose_forced import sample_rows
 from sysid.diagnose_loop import simulated
-from sysid.diagnosis import Diagnosis
+from sysid.result import Diagnosis
 
 SHOWN_S = 12.0
 """Length of the stretch that is drawn [s]."""

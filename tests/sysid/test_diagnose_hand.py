@@ -7,8 +7,8 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from sysid.diagnose_forced import joint_effects
 from sysid.diagnose_hand import extended_hand
-from sysid.diagnosis import Cause, Diagnosis, Estimate
 from sysid.mechanism import hand_mechanism
+from sysid.result import Cause, Diagnosis, Estimate
 
 HAND = load_hand_file()
 

@@ -10,7 +10,7 @@ from sysid.diagnose_model import Model, gain_nat
 from sysid.diagnose_search import _fullest
 from sysid.diagnose_stage import _fits_in
 from sysid.diagnose_worth import told
-from sysid.fit import Fit
+from sysid.least_squares import Fit
 
 PROBLEM: Any = SimpleNamespace(counts=lambda: np.ones(2000, bool))
 """Two residuals of 1,000 samples."""

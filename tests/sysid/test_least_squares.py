@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sysid.fit import Task, fit_all
+from sysid.least_squares import Task, fit_all
 
 RNG = np.random.default_rng(3)
 A, Y = RNG.normal(size=(40, 3)), RNG.normal(size=40)
