@@ -24,8 +24,8 @@ import mujoco
 import numpy as np
 from scipy.signal import lfilter
 
-from sysid.calibrate_motion import Motion
-from sysid.calibrate_record import joint_record
+from sysid.calibration.record import joint_record
+from sysid.calibration.simulation import Motion
 from sysid.data import MeasuredLog, make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 from sysid.search_fit import Search

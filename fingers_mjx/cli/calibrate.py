@@ -5,8 +5,8 @@ import argparse
 from envs.config.typed import load_yaml
 from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli.excite import mechanism_of
-from sysid.calibrate import Calibration, calibrate, calibrated_hand
-from sysid.calibrate_figures import write_figures
+from sysid.calibration.calibrate import Calibration, calibrate, calibrated_hand
+from sysid.calibration.figures import write_figures
 from sysid.data_bag import BagMap
 from sysid.data_read import read_log
 

@@ -3,9 +3,9 @@
     found = calibrate([read_log("index.csv")], hand_mechanism())
     hand = calibrated_hand(load_hand_file(), found)
 
-Joints are fitted one by one (`sysid.calibrate_joint`); what all joints share is the
+Joints are fitted one by one (`sysid.calibration.joint`); what all joints share is the
 mean of theirs, weighed by their intervals, and its interval is at least as wide as
-they scatter. Records of loaded pulls (`sysid.calibrate_friction`) give the friction.
+they scatter. Records of loaded pulls (`sysid.calibration.friction`) give the friction.
 """
 
 import dataclasses
@@ -20,8 +20,8 @@ from scipy.stats import t as student
 from envs.errors import InputError
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile, JointQuantity, Quantity
-from sysid.calibrate_friction import Pull, is_pull, pull_of
-from sysid.calibrate_joint import JointFit, fit_joint
+from sysid.calibration.friction import Pull, is_pull, pull_of
+from sysid.calibration.joint import JointFit, fit_joint
 from sysid.data import MeasuredLog
 from sysid.mechanism import Mechanism
 from sysid.result import Estimate

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float
 
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
-from sysid.calibrate_neighbours import Neighbours, neighbours_along
+from sysid.calibration.neighbours import Neighbours, neighbours_along
 from sysid.data import MeasuredLog
 from sysid.data_timing import continuous_parts
 from sysid.excite import rest_posture

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import numpy as np
 
-from sysid.calibrate import Calibration
-from sysid.calibrate_joint import JointFit
+from sysid.calibration.calibrate import Calibration
+from sysid.calibration.joint import JointFit
 
 _MEASURED, _SIMULATED = "#0072B2", "#D55E00"
 _PANELS = ("angle [rad]", "effort [N·m]")

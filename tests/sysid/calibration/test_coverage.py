@@ -9,7 +9,7 @@ import pytest
 from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
-from sysid.calibrate_joint import fit_joint
+from sysid.calibration.joint import fit_joint
 from sysid.mechanism import hand_mechanism
 
 HANDS = 10

@@ -12,9 +12,9 @@ from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
-from sysid.calibrate import calibrate, calibrated_hand, weighed_mean
-from sysid.calibrate_figures import write_figures
-from sysid.calibrate_friction import pull_of
+from sysid.calibration.calibrate import calibrate, calibrated_hand, weighed_mean
+from sysid.calibration.figures import write_figures
+from sysid.calibration.friction import pull_of
 from sysid.data import make_log
 from sysid.mechanism import hand_mechanism
 

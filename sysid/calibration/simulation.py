@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states
 from envs.actuator.joint import joint_step
-from sysid.calibrate_record import BLOCK_S, STEP_S, Record
+from sysid.calibration.record import BLOCK_S, STEP_S, Record
 from sysid.search_fit import Search
 
 SERVO = slice(0, 5)

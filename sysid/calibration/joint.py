@@ -1,6 +1,6 @@
 """Stiffness, damping, delay, cutoff and speed of one joint.
 
-The joint is simulated on the recorded targets (`sysid.calibrate_motion`) and its
+The joint is simulated on the recorded targets (`sysid.calibration.simulation`) and its
 figures are moved until angle and, where it was logged, effort agree. Inertia, weight
 and both frictions are fitted along within what is known of them, and neighbours move
 along, so that they bend nothing.
@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from sysid.calibrate_motion import SERVO, Motion
-from sysid.calibrate_record import Record, joint_record
+from sysid.calibration.record import Record, joint_record
+from sysid.calibration.simulation import SERVO, Motion
 from sysid.data import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
 

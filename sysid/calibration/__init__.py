@@ -1,0 +1,1 @@
+"""The paper's procedures: three parameters of each joint from one log."""
