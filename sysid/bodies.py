@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 from envs.quiet_mujoco import mujoco
 from sysid.data import MeasuredLog
-from sysid.diagnose_records import Piece
+from sysid.diagnosis.measured.segments import Piece
 from sysid.mechanism import Mechanism
 
 PAYLOAD = "payload"

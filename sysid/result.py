@@ -76,7 +76,7 @@ class Gain:
 
 @dataclass(frozen=True)
 class Diagnosis:
-    """The verdict on records of one mechanism; see `sysid.diagnose`.
+    """The verdict on records of one mechanism; see `sysid.diagnosis.diagnose`.
 
     Attributes:
         verdict: `none` nothing significant; `found` causes by name; `ambiguous` one of

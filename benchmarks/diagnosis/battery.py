@@ -95,7 +95,7 @@ def run_task(task: Task) -> Row:
     """Draws the case and diagnoses it."""
     from benchmarks.diagnosis.hidden.believed import believed, true_parameters
     from envs.errors import InputError
-    from sysid.diagnose import diagnose
+    from sysid.diagnosis.diagnose import diagnose
 
     case = draw_case(task.seed, task.effects, task.magnitude, task.kind)
     kind = task.kind
@@ -150,7 +150,7 @@ def _shown(task: Task, case: Case) -> bool:
     A light one cannot show some effects, however large they are, and others throw it
     about: the pendulum can, and has a wide one.
     """
-    from sysid.diagnose_checks import BEYOND_RAD
+    from sysid.diagnosis.measured.checks import BEYOND_RAD
 
     if not task.effects or task.magnitude not in RATIOS:
         return True

@@ -16,7 +16,7 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
-from sysid.diagnose import diagnose
+from sysid.diagnosis.diagnose import diagnose
 
 RECORDS = {"pendulum": (500.0, 10.0), "hand": (200.0, 20.0)}
 """Rows in a second and length of a round [s]; there are three rounds."""

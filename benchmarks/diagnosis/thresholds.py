@@ -15,11 +15,11 @@ import numpy as np
 
 from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import draw_case
-from sysid.diagnose import problem_of
-from sysid.diagnose_model import fit_models, gain_nat
-from sysid.diagnose_search import settled
-from sysid.diagnose_stage import extended
-from sysid.diagnose_tracks import all_tracks
+from sysid.diagnosis.diagnose import problem_of
+from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.candidate import fit_models, gain_nat
+from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.stage import extended
 
 
 def largest_gains(seed: int) -> dict:

@@ -10,8 +10,8 @@ from fingers_mjx.cli.excite import mechanism_of
 from fingers_mjx.evaluation.files import write_atomic
 from sysid.data_bag import BagMap
 from sysid.data_read import read_log
-from sysid.diagnose import examine
-from sysid.diagnose_hand import extended_hand
+from sysid.diagnosis.diagnose import examine
+from sysid.diagnosis.verdict.hand import extended_hand
 
 
 def run(args: argparse.Namespace) -> int:

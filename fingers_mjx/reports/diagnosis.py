@@ -14,9 +14,9 @@ from fingers_mjx.reports.page import (
     picture,
     write_report,
 )
-from sysid.diagnose import Examined
-from sysid.diagnose_forced import sample_rows
-from sysid.diagnose_loop import simulated
+from sysid.diagnosis.diagnose import Examined
+from sysid.diagnosis.replay.residuals import sample_rows
+from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Diagnosis
 
 SHOWN_S = 12.0

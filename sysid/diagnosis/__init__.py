@@ -1,0 +1,1 @@
+"""Which effects a measured log has that the simulation lacks."""

@@ -1,0 +1,121 @@
+"""Names what the simulation of a mechanism lacks, from records of the mechanism.
+
+    diagnosis = diagnose([read_log("knee.csv")], hand_mechanism(), seed=0)
+    print(diagnosis.to_json())
+
+Every joint is searched for itself (`sysid.diagnosis.search.search`); effects that several
+joints share are told once, with where they act.
+"""
+
+import os
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from envs.errors import InputError
+from sysid.data import MeasuredLog
+from sysid.diagnosis.replay.track import JointTrack, all_tracks
+from sysid.diagnosis.search.parameters import make_space
+from sysid.diagnosis.search.problem import Problem, make_problem
+from sysid.diagnosis.search.search import Search, search
+from sysid.diagnosis.verdict.verdict import verdict_of
+from sysid.mechanism import Mechanism
+from sysid.result import Diagnosis
+
+LEAST_MOTION = 2e-3
+"""Least range of a target in which something can be seen [rad or m]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What was done with one joint; for reports.
+
+    Attributes:
+        track: its measured motion.
+        problem: residuals and weights; None for a joint that did not move.
+        search: what was found; None likewise.
+    """
+
+    track: JointTrack
+    problem: Problem | None
+    search: Search | None
+
+
+def diagnose(
+    logs: Sequence[MeasuredLog], mechanism: Mechanism, seed: int = 0
+) -> Diagnosis:
+    """Compares records with the simulation and names the cause of the difference.
+
+    Args:
+        logs: records of the same mechanism; different gains, loads or days in records
+            of their own.
+        mechanism: the simulation as it stands.
+        seed: of everything random.
+
+    Raises:
+        InputError: records that cannot be used, in one sentence.
+    """
+    return examine(logs, mechanism, seed)[0]
+
+
+def examine(
+    logs: Sequence[MeasuredLog], mechanism: Mechanism, seed: int = 0
+) -> tuple[Diagnosis, list[Examined]]:
+    """Does the same and also returns what was done with every joint."""
+    started = time.monotonic()
+    if not logs:
+        raise InputError("logs", "", "no record", "at least one")
+    tracks = all_tracks(logs, mechanism)
+    with ThreadPoolExecutor(os.cpu_count()) as joints:
+        each = partial(_examined, logs=logs, mechanism=mechanism)
+        examined = list(joints.map(each, tracks))
+    found = verdict_of(examined, mechanism, seed)
+    return (
+        Diagnosis(
+            **found,
+            log_sha256=tuple(log.sha256 for log in logs),
+            seed=seed,
+            runtime_s=round(time.monotonic() - started, 3),
+        ),
+        examined,
+    )
+
+
+def _examined(
+    track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism
+) -> Examined:
+    """Searches one joint, if it moved."""
+    seen = [track.track.cmd]
+    if mechanism.drives[track.joint].known == "controller":
+        seen.append(track.track.pos)  # pulled by forces that nobody knows
+    moved = any(np.ptp(np.asarray(x)) > LEAST_MOTION for x in seen)
+    pushed = bool(np.any(np.asarray(track.track.ext)))
+    if not (moved or pushed) or not np.any(track.valid):
+        return Examined(track, None, None)
+    alone = not np.any(np.asarray(track.track.others_nm))
+    problem = problem_of(track, logs, mechanism, not alone)
+    if not problem.valid.any():  # it only moves where the rows cannot follow
+        return Examined(track, None, None)
+    result = search(problem)
+    return Examined(result.problem.data, result.problem, result)
+
+
+def problem_of(
+    track: JointTrack, logs: Sequence[MeasuredLog], mechanism: Mechanism, company: bool
+) -> Problem:
+    """Makes the problem of a joint.
+
+    Args:
+        track: its measured motion.
+        logs: the records.
+        mechanism: the simulation as it stands.
+        company: whether other joints move too.
+    """
+    drive = mechanism.drives[track.joint]
+    known = {"others_nm": True, "gravity": True, "other_q": company}
+    known["other_nm"] = known["other_q"]
+    return make_problem(track, make_space(track, drive, known), logs, drive.known)

@@ -1,0 +1,1 @@
+"""Equation-error residuals along the measured motion."""

@@ -1,0 +1,1 @@
+"""Nested models: candidates, fits, selection, intervals."""

@@ -1,0 +1,140 @@
+"""From where the fits of an effect begin."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+from scipy.signal import lfilter
+
+from sysid.diagnosis.replay.residuals import EVERY, TAPS
+from sysid.diagnosis.search.candidate import Model, bent
+from sysid.diagnosis.search.problem import LANES, Problem
+
+COMB = (0.02, 0.002)
+"""Logarithms around the best start within which a comb of optima is searched."""
+
+MOST_TEETH = 6e7
+"""Largest number of grids that are tried, times that of the targets."""
+
+GONE = 2.0
+"""Prior deviations by which a figure has gone far."""
+
+TEETH = 16
+"""Number of steps of a grid whose starts are tried in the whole chain."""
+
+
+def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str, list]:
+    """Returns the best starts of every effect: near the model, and from the figures.
+
+    A start counts by the error that is left when the nuisances follow it linearly. One
+    that changes nothing, a limit that the record does not reach, comes last: from there
+    no slope leads anywhere. A figure that has already gone far goes on from there.
+    """
+    result: dict[str, list] = {name: [] for name in names}
+    for name in names:
+        if bent(problem, model, name) > GONE:
+            result[name].append(model.fit.theta)
+    fitted, nominal = model.fit.theta, problem.space.base.copy()
+    kept = [i for e in model.effects for i in problem.space.of(e)]
+    nominal[kept] = fitted[kept]
+    for origin, count in ((fitted, 2), (nominal, 1)):
+        some = names if count == 2 else [n for n in names if not _comb(problem, n)]
+        owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
+        thetas = np.stack([origin, *(t for _, t in owned)])
+        rest, *costs = _linear_costs(problem, model, thetas)
+        idle = np.isclose(costs, rest, rtol=1e-6, atol=0.0)
+        for name in some:
+            mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
+            few = count if len(mine) > 2 else 1
+            best = sorted(mine, key=lambda k: (idle[k], costs[k]))[:few]
+            result[name] += [owned[k][1] for k in best]
+    return result
+
+
+def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
+    """Returns the coordinates that are tried for an effect."""
+    if not _comb(problem, name):
+        return [_placed(origin, start) for start in problem.space.starts(name)]
+    index = problem.space.of(name)[0]
+    starts = [_placed(origin, {index: u}) for u in _teeth(problem, origin, index)]
+    for spread in COMB:
+        costs = _linear_costs(problem, model, np.stack(starts))
+        best = starts[int(np.argmin(costs))]
+        for factor in np.exp(np.linspace(-spread, spread, 31)):
+            theta = best.copy()
+            theta[index] *= factor
+            starts.append(theta)
+    return starts
+
+
+def _placed(origin: np.ndarray, start: dict[int, float]) -> np.ndarray:
+    theta = origin.copy()
+    theta[list(start)] = list(start.values())
+    return theta
+
+
+def _teeth(
+    problem: Problem, origin: Float[np.ndarray, " n"], index: int
+) -> Float[np.ndarray, " k"]:
+    """Returns coordinates of grids near which the commands' optima lie.
+
+    With largest target u, grids Δ and Δ' agree on it while |u / Δ − u / Δ'| is well
+    below ½. So close together thousands are tried, and not in the whole chain but by
+    how much what is left looks like the rounding behind delay and low-pass.
+    """
+    slot, track = problem.space.slots[index], problem.data.track
+    targets = np.asarray(track.held, float)[:, -1]
+    ends = [slot.scale * u for u in (slot.starts[-1], slot.starts[0])]
+    count = 8.0 * np.abs(targets).max() * (1.0 / ends[1] - 1.0 / ends[0]) + 2.0
+    most = max(MOST_TEETH / targets.size, 1e3)
+    grids = 1.0 / np.linspace(1.0 / ends[0], 1.0 / ends[1], int(min(count, most)))
+    values, _ = problem.space.values(origin[None])
+    delay = values["transport_delay"]["delay_s"][0] / problem.data.dt
+    keeps = np.exp(
+        -2.0 * np.pi * values["lowpass_cutoff"]["cutoff_hz"][0] * problem.data.dt
+    )
+    raw = problem.raw(origin[None])
+    left = problem.whitened(raw)[0]
+    seen = 0 if problem.valid[0].any() else 1
+    gain = np.asarray(track.kp) * (2.0 * seen - 1.0) * problem.weight[seen]
+    likeness = []
+    for first in range(0, len(grids), LANES):
+        grid = grids[first : first + LANES, None, None]
+        rounding = grid * np.round(targets / grid) - targets
+        smooth = np.asarray(lfilter([1.0 - keeps], [1.0, -keeps], rounding, axis=1))
+        moved = np.zeros((len(grid), *raw.shape[1:]))
+        # A target comes anywhere in the step that ends with it.
+        moved[:, seen] = gain * _banded(smooth, delay + 0.5, raw.shape[2])
+        shown = problem.whitened(np.where(problem.valid, moved, 0.0))
+        size = np.sqrt(np.sum(shown**2, 1))
+        likeness.append(-shown @ left / np.maximum(size, 1e-12))
+    best = np.argsort(-np.concatenate(likeness))[:TEETH]
+    return grids[best] / slot.scale
+
+
+def _banded(x: np.ndarray, delay: float, count: int) -> Float[np.ndarray, "c m p"]:
+    """Reads signals some steps earlier and passes them through the residuals' band."""
+    place = np.clip(np.arange(x.shape[1]) - delay, 0.0, x.shape[1] - 1.0)
+    low = np.minimum(place.astype(int), x.shape[1] - 2)
+    part = (place - low)[:, None]
+    late = (1.0 - part) * x[:, low] + part * x[:, low + 1]
+    last = (count - 1) * EVERY + 1
+    parts = [w * late[:, k : k + last : EVERY] for k, w in enumerate(TAPS.tolist())]
+    return np.sum(parts, 0)
+
+
+def _comb(problem: Problem, name: str) -> bool:
+    return problem.space.slots[problem.space.of(name)[0]].comb
+
+
+def _linear_costs(problem: Problem, model: Model, thetas: np.ndarray) -> np.ndarray:
+    """Returns the errors that are left when the nuisances follow linearly."""
+    rs = problem.residual(thetas)
+    fit, space = model.fit, problem.space
+    deviation = space.deviations(model.effects)[fit.free]
+    j = np.concatenate([fit.jacobian, np.diag(1.0 / deviation)])
+    center = (thetas - space.base)[:, fit.free] / deviation
+    full = np.concatenate([rs, center], 1)
+    q, _ = np.linalg.qr(j)
+    cost = np.sum(full**2, 1) - np.sum((full @ q) ** 2, 1)
+    return np.where(np.isfinite(cost), cost, np.inf)

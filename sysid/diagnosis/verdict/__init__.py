@@ -1,0 +1,1 @@
+"""From the selected model to causes, evidence and advice."""

@@ -1,0 +1,110 @@
+"""What the causes gain on folds that no fit saw, and what no model can remove."""
+
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from sysid.diagnosis.replay.residuals import sample_rows
+from sysid.diagnosis.search.candidate import Model, fit_models
+from sysid.diagnosis.search.parameters import SIGMA, Space
+from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.verdict.closed_loop import simulated
+from sysid.result import Gain
+
+BLOCKS = 24
+DRAWS = 400
+
+
+def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str, Gain]:
+    """Returns the gains by residual.
+
+    Args:
+        found: a search.
+        units: of `position`, `controller` and `mechanics`.
+        seed: of the bootstrap over blocks of time.
+    """
+    gains, base = {}, within_tolerances(found.problem, found.base)
+    for name, k in (("controller", 0), ("mechanics", 1)):
+        if found.problem.valid[k].any():
+            before, after = (_heldout(found.problem, m, k) for m in (base, found.best))
+            gains[name] = _gain(found.problem, before, after, k, units[name], seed)
+    if found.problem.valid[:2].any((1, 2)).all() or not found.problem.data.effort.any():
+        before, after = (_angle_errors(found.problem, m) for m in (base, found.best))
+        gains["position"] = _gain(
+            found.problem, before, after, 1, units["position"], seed
+        )
+    return gains
+
+
+def within_tolerances(problem: Problem, base: Model) -> Model:
+    """Fits the figures of the simulation again, none of them beyond its tolerance.
+
+    A search lets them go further, at a price; but an error that a figure out of its
+    tolerance would hide is there before the cause is known.
+    """
+    slots = []
+    for slot in problem.space.slots:
+        reach = slot.tight / SIGMA if slot.tight > 0.0 else np.inf
+        low, high = max(slot.low, slot.base - reach), min(slot.high, slot.base + reach)
+        slots.append(replace(slot, low=low, high=high))
+    bounded = replace(problem, space=Space(tuple(slots)))
+    return fit_models(bounded, [()], [base.fit.theta])[0]
+
+
+def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, "m p"]:
+    """Residual of every sample with the parameters that were found without its fold."""
+    raw = problem.raw(model.fold_theta)[:, channel]
+    return np.take_along_axis(raw, problem.fold[None], 0)[0]
+
+
+def _angle_errors(problem: Problem, model: Model) -> Float[np.ndarray, "m p"]:
+    """The same for the measured less the simulated angle."""
+    rows = sample_rows(len(problem.data.track.cmd))
+    measured = np.asarray(problem.data.track.pos, float)
+    error = (measured - simulated(problem, model.fold_theta))[:, rows]
+    return np.take_along_axis(error, problem.fold[None], 0)[0]
+
+
+def _gain(problem, before, after, k, unit, seed) -> Gain:
+    """Compares two held-out errors."""
+    valid = problem.valid[k]
+    floors = [_floor(problem, errors, valid) for errors in (before, after)]
+    floor = min((f for f in floors if f is not None), default=None)
+    old, new = before[valid] ** 2, after[valid] ** 2
+    part = np.array_split(np.arange(old.size), min(BLOCKS, max(1, old.size // 4)))
+    sums = np.array([(old[i].sum(), new[i].sum(), len(i)) for i in part])
+    rng = np.random.default_rng(seed)
+    draws = sums[rng.integers(0, len(sums), (DRAWS, len(sums)))].sum(1)
+    shares = _explained(draws[:, 0] / draws[:, 2], draws[:, 1] / draws[:, 2], floor)
+    total = sums.sum(0)
+    low, high = np.percentile(shares, [2.5, 97.5])
+    return Gain(
+        heldout_rmse_before=float(np.sqrt(total[0] / total[2])),
+        heldout_rmse_after=float(np.sqrt(total[1] / total[2])),
+        explained_fraction=float(
+            _explained(total[0] / total[2], total[1] / total[2], floor)
+        ),
+        low=float(low),
+        high=float(high),
+        unit=unit,
+        noise_floor=floor,
+    )
+
+
+def _explained(before, after, floor: float | None):
+    """Share of the removable variance that is removed, at most one."""
+    least = 0.0 if floor is None else floor**2
+    removable = np.maximum(before - least, 1e-3 * before)
+    return np.minimum((before - np.maximum(after, least)) / removable, 1.0)
+
+
+def _floor(problem: Problem, errors: np.ndarray, valid: np.ndarray) -> float | None:
+    """Noise from repeats: what differs although the targets are the same."""
+    n = problem.repeat
+    if not n:
+        return None
+    both = valid[n:] & valid[:-n]
+    d = (errors[n:] - errors[:-n])[both] / np.sqrt(2.0)
+    return float(np.sqrt(np.mean(d**2))) if d.size else None

@@ -1,0 +1,91 @@
+"""The words of a diagnosis: warnings, what to record next, and the summary."""
+
+import numpy as np
+
+from envs.actuator.catalogue import CATALOGUE
+from sysid.diagnosis.search.search import Search
+
+
+def warnings_of(found: Search) -> list[str]:
+    """Tells bounds met and figures far out of their tolerance."""
+    slots, fit = found.problem.space.slots, found.best.fit
+    joint = found.problem.data.joint
+    texts = [
+        f"{joint}: {slots[i].effect}.{slots[i].name} met its bound"
+        for i in fit.bounded
+        if slots[i].effect in found.best.effects
+    ]
+    for i in fit.free:
+        slot = slots[i]
+        if slot.effect in found.best.effects or not np.isfinite(slot.tight):
+            continue
+        away = abs(fit.theta[i] - slot.base) / slot.tight
+        if away > 4.0:
+            name = f"{slot.effect}.{slot.name}".lstrip(".")
+            texts.append(f"{joint}: {name} lies {away:.0f} tolerances from its figure")
+    if not found.problem.repeat:
+        texts.append(f"{joint}: no repeats, so the noise floor is not known")
+    return texts
+
+
+def next_experiment(verdict, causes, rivals, blind) -> str:
+    """Proposes what to record next."""
+    if verdict == "ambiguous":
+        nearest = next(r for r in rivals if not r.distinguishable)
+        rival, first = nearest.effect, nearest.cause or causes[0].effect
+        hint = CATALOGUE[first].confusable_with.get(rival) or CATALOGUE[
+            rival
+        ].confusable_with.get(first)
+        hint = hint or "another gain of the controller, and another load"
+        return f"To tell {first} from {rival}: {hint}."
+    if verdict == "unexplained":
+        return (
+            "Repeat one motion three times alone, slowly and fast, with and without "
+            "load, to see what the remaining error depends on."
+        )
+    if verdict == "not_observable":
+        shown = ", ".join(blind[:6])
+        return (
+            "Record large steps, slow triangles with reversals, holds under load and "
+            f"stalls; these records cannot show {shown}."
+        )
+    return ""
+
+
+def summary_of(verdict, causes, alternatives, gain, blind, left) -> str:
+    """Says the verdict in two sentences."""
+    if verdict == "none":
+        return "The simulation agrees with the records within noise and tolerances."
+    if verdict == "not_observable":
+        shown = ", ".join(blind[:8]) or "any effect"
+        return (
+            "No difference beyond noise and tolerances; these records could not have "
+            f"shown {shown}."
+        )
+    if verdict == "unexplained" and not causes:
+        return "Something is there that no known effect explains: " + "; ".join(left)
+    names = " and ".join(f"{c.effect} ({c.where})" for c in causes)
+    share = ""
+    if gain is not None:
+        before, after = gain.heldout_rmse_before, gain.heldout_rmse_after
+        share = (
+            " On data that the fit did not see the error falls from "
+            f"{before:.3g} to {after:.3g} {gain.unit}."
+        )
+    if verdict == "unexplained":
+        return f"Known effects explain too little; the nearest is {names}.{share}"
+    if verdict == "ambiguous":
+        return f"The simulation lacks {names}, or {_instead(alternatives)}.{share}"
+    return f"The simulation lacks {names}.{share}"
+
+
+def _instead(alternatives) -> str:
+    """Says which effects may stand in the place of which causes."""
+    same: dict[str, list[str]] = {}
+    for rival in alternatives:
+        if not rival.distinguishable:
+            same.setdefault(rival.cause, []).append(rival.effect)
+    return " and ".join(
+        f"one of {', '.join(effects)} instead of {cause}"
+        for cause, effects in same.items()
+    )

@@ -1,0 +1,171 @@
+"""Neighbours that pull, repeats under jitter, and what named causes leave."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks.diagnosis.hidden.believed import believed
+from benchmarks.diagnosis.hidden.cases import draw_case
+from benchmarks.diagnosis.hidden.recording import standard
+from benchmarks.diagnosis.hidden.sampling import Noise, record
+from benchmarks.diagnosis.hidden.stands import make_stand
+from sysid.data import make_log
+from sysid.diagnosis.diagnose import problem_of
+from sysid.diagnosis.measured.segments import grid_step_s
+from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search import exchange as diagnose_exchange
+from sysid.diagnosis.search.candidate import fit_models
+from sysid.diagnosis.search.coupling import beside, coupled
+from sysid.diagnosis.search.search import Search, settled
+from sysid.diagnosis.search.starts import starts_of
+from sysid.diagnosis.verdict.unexplained import _jumps, left_over
+
+
+@pytest.fixture(scope="module")
+def searched():
+    """A joint without any effect, and its problem."""
+    case = draw_case(17, kind="pendulum", round_s=6.0)
+    mechanism, logs = believed(case.stand), list(case.logs)
+    problem = problem_of(all_tracks(logs, mechanism)[0], logs, mechanism, False)
+    problem, base = settled(problem)
+    samples = int(problem.counts().sum())
+    return Search(problem, base, base, {}, {}, samples)
+
+
+@pytest.mark.parametrize("other", [0, 2])
+def test_a_joint_is_pulled_from_below_or_above(other):
+    rng = np.random.default_rng(3)
+    stand = make_stand("finger", rng)
+    once = standard(rng, stand.middle, stand.reach, 200.0, 6.0, 1, False)
+    truth = stand.mechanism.with_effect(
+        1, "joint_coupling", other=other, stiffness_nm_rad=0.05
+    )
+    log = record(truth, once, Noise(), rng, palm_quat_w=stand.mechanism.base_quat_w)
+    mechanism, names = believed(stand), stand.names
+    track = all_tracks([log], mechanism)[1]
+    assert list(track.neighbours) == [names[0], names[2]]
+    problem, base = settled(problem_of(track, [log], mechanism, True))
+    found = coupled(problem, base).data
+    assert found.other == names[other]
+    assert np.asarray(found.track.other_q)[:, 0] == pytest.approx(
+        np.asarray(beside(track, names[other]).track.other_q)[:, 0]
+    )
+
+
+def test_jitter_does_not_widen_the_grid():
+    """The median of these steps is 5.01 ms, and repeats would be missed."""
+    steps = np.resize([0.00501, 0.00501, 0.00501, 0.00497], 4000)
+    t_s = np.concatenate([[0.0], np.cumsum(steps)])
+    t_s = np.delete(t_s, [500, 1500])
+    columns = {"cmd.a": np.sin(t_s), "pos.a": np.sin(t_s)}
+    assert grid_step_s([make_log(("a",), t_s, columns)], ["a"]) == 0.005
+
+
+def test_nothing_is_left_of_a_joint_without_effects(searched):
+    assert left_over(searched) == []
+
+
+def test_an_error_common_to_the_repeats_is_left(searched):
+    wrong = replace(searched.best, errors=np.array([1.0, 4.6]))
+    before = replace(searched.best, errors=np.array([1.0, 16.0]))
+    left = left_over(replace(searched, base=before, best=wrong))
+    assert len(left) == 1
+    assert "mechanics residual" in left[0]
+    right = replace(searched.best, errors=np.array([1.0, 1.6]))
+    assert left_over(replace(searched, base=before, best=right)) == []
+
+
+def test_sizes_at_the_end_of_their_range_explain_nothing(searched):
+    problem = searched.problem
+    (i,) = problem.space.of("encoder_scale")
+    model = fit_models(problem, [("encoder_scale",)], [searched.base.fit.theta])[0]
+    assert left_over(replace(searched, best=model)) == []
+    theta = model.fit.theta.copy()
+    theta[i] = problem.space.slots[i].high
+    edge = replace(model, fit=replace(model.fit, theta=theta, bounded=(i,)))
+    assert (
+        "encoder_scale.scale met its bound"
+        in left_over(replace(searched, best=edge))[0]
+    )
+
+
+def test_a_cause_that_bends_a_figure_is_not_all(searched):
+    problem = searched.problem
+    (i,) = problem.space.of("stiffness")
+    model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
+    theta = model.fit.theta.copy()
+    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
+    bent = replace(model, fit=replace(model.fit, theta=theta))
+    left = left_over(replace(searched, best=bent))
+    assert any("stiffness.scale lies 6" in text for text in left)
+
+
+def test_jumps_that_do_not_repeat_are_not_noise(searched):
+    problem = searched.problem
+    jumps = np.zeros_like(np.asarray(problem.data.track.effort))
+    rows = np.flatnonzero(problem.valid[0][:, 0])[[200, 700]] * 4 + 8
+    for row in rows:
+        jumps[row - 8 : row + 9] += 20.0 * problem.noise[0].deviation
+    track = problem.data.track
+    effort = (np.asarray(track.effort) + jumps).astype(np.float32)
+    data = replace(problem.data, track=track.replace(effort=effort))
+    shaken = replace(problem, data=data)
+    left = left_over(replace(searched, problem=shaken))
+    assert any("controller residual has jumps" in text for text in left)
+    model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
+    left = left_over(replace(searched, problem=shaken, best=model))
+    assert any("controller residual has jumps" in text for text in left)
+
+
+def test_a_figure_that_has_gone_far_goes_on_from_there(searched):
+    problem, base = searched.problem, searched.base
+    (i,) = problem.space.of("damping")
+    theta = base.fit.theta.copy()
+    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
+    gone = replace(base, fit=replace(base.fit, theta=theta))
+    far = starts_of(problem, gone, ["damping"])["damping"]
+    assert any(start is theta for start in far)
+    near = starts_of(problem, base, ["damping"])["damping"]
+    assert not any(start is base.fit.theta for start in near)
+
+
+def test_steps_of_an_encoder_are_no_jumps(searched):
+    """Beside a cause that leaves next to nothing, a least step lies far out."""
+    problem = searched.problem
+    quiet = np.zeros((2, *problem.valid.shape[1:]))
+    at = np.argwhere(problem.valid[0])[100]
+    quiet[0][tuple(at)] = problem.noise[0].deviation
+    assert not _jumps(problem, quiet[0], 0)
+    quiet[0][tuple(at)] *= 20.0
+    assert _jumps(problem, quiet[0], 0)
+
+
+def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
+    """The first of two causes was chosen when it had to stand for both."""
+    problem = searched.problem
+    base = replace(searched.base, errors=np.array([4.0, 4.0]))
+
+    def scored(effects, gained):
+        score = base.score - 2.0 * gained
+        fit = replace(base.fit, cost=base.fit.cost - 2.0 * gained)
+        errors = base.errors - gained / 200.0
+        return replace(base, effects=effects, score=score, fit=fit, errors=errors)
+
+    first = scored(("payload_com", "deadband"), 300.0)
+    right = scored(("deadband", "joint_coupling"), 340.0)
+    alone = scored(("deadband",), 100.0)
+    without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
+    offered = {first.effects: {"payload_com": [right], "deadband": []}}
+    monkeypatch.setattr(
+        diagnose_exchange,
+        "swapped",
+        lambda problem, best, base: (offered.get(best.effects, {}), without),
+    )
+    monkeypatch.setattr(diagnose_exchange, "pruned", lambda problem, model, base: model)
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is right
+    close = scored(right.effects, 302.0)
+    offered[first.effects]["payload_com"] = [close]
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is first
+    without["deadband"] = scored(("payload_com",), 298.0)
+    assert diagnose_exchange.exchanged(problem, first, base)[0] is without["deadband"]
