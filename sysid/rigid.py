@@ -6,7 +6,7 @@ from jaxtyping import Float
 
 from envs.actuator.surroundings import Gravity, Surroundings
 from envs.quiet_mujoco import mujoco
-from sysid.excite import joint_address
+from sysid.excitation.plan import joint_address
 from sysid.mechanism import Mechanism
 
 _EVERY = 4

@@ -4,11 +4,11 @@ import argparse
 
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
-from sysid.excite import Limits, joint_groups
-from sysid.excite_check import fitting_plan
-from sysid.excite_files import separation_lines, write_plan
-from sysid.excite_separate import separation
-from sysid.excite_waves import WAVES
+from sysid.excitation.check import fitting_plan
+from sysid.excitation.files import separation_lines, write_plan
+from sysid.excitation.plan import Limits, joint_groups
+from sysid.excitation.separation import separation
+from sysid.excitation.waves import WAVES
 from sysid.mechanism import Mechanism, hand_mechanism, mjcf_mechanism
 
 

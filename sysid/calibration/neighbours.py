@@ -21,7 +21,7 @@ from jaxtyping import Float
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states
 from envs.quiet_mujoco import mujoco
-from sysid.excite import joint_address
+from sysid.excitation.plan import joint_address
 from sysid.mechanism import JointDrive, Mechanism
 
 _COUPLED = 0.02

@@ -10,7 +10,7 @@ from envs.quiet_mujoco import mujoco
 from sysid.calibration.neighbours import Neighbours, neighbours_along
 from sysid.data import MeasuredLog
 from sysid.data_timing import continuous_parts
-from sysid.excite import rest_posture
+from sysid.excitation.plan import rest_posture
 from sysid.mechanism import Mechanism
 from sysid.rigid import gravity_torque, rigid_along
 

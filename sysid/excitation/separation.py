@@ -27,8 +27,8 @@ from envs.actuator.chain import chain_step, init_states
 from envs.actuator.effect import EffectKind
 from envs.actuator.joint import joint_step
 from envs.actuator.surroundings import Surroundings
-from sysid.excite import Plan
-from sysid.excite_check import STEP_S
+from sysid.excitation.check import STEP_S
+from sysid.excitation.plan import Plan
 from sysid.mechanism import JointDrive, Mechanism
 from sysid.rigid import gravity_torque, rigid_along
 

@@ -5,11 +5,11 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.stands import make_stand
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
-from sysid.excite import Limits, joint_groups, make_plan, rest_posture
-from sysid.excite_check import fitting_plan, rehearse
-from sysid.excite_files import separation_lines, write_plan
-from sysid.excite_separate import separation
-from sysid.excite_waves import WAVES, multisine_lines
+from sysid.excitation.check import fitting_plan, rehearse
+from sysid.excitation.files import separation_lines, write_plan
+from sysid.excitation.plan import Limits, joint_groups, make_plan, rest_posture
+from sysid.excitation.separation import separation
+from sysid.excitation.waves import WAVES, multisine_lines
 from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
 
 TWO_ARMS = """

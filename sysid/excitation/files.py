@@ -10,10 +10,10 @@ import numpy as np
 
 from envs.actuator.catalogue import effect_kind
 from envs.config.typed import dump_yaml
-from sysid.excite import Plan
-from sysid.excite_check import Rehearsal
-from sysid.excite_separate import NO_LIMIT, Separation
-from sysid.excite_waves import WAVES
+from sysid.excitation.check import Rehearsal
+from sysid.excitation.plan import Plan
+from sysid.excitation.separation import NO_LIMIT, Separation
+from sysid.excitation.waves import WAVES
 
 
 def write_plan(

@@ -14,7 +14,7 @@ from envs.actuator.catalogue import effect_kind
 from envs.actuator.chain import chain_step, init_states
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
-from sysid.excite import Limits, Plan, joint_address, joint_range, make_plan
+from sysid.excitation.plan import Limits, Plan, joint_address, joint_range, make_plan
 from sysid.mechanism import Mechanism
 
 STEP_S = 0.001

@@ -1,8 +1,8 @@
 """Plans of excitation: targets that make a joint show what it is.
 
 A plan moves joints or groups of joints through waves, each repeated, inside the limits
-of position, speed and torque. `sysid.excite_check` simulates it with collisions and
-makes it smaller where it would leave them; `sysid.excite_separate` tells which effects
+of position, speed and torque. `sysid.excitation.check` simulates it with collisions and
+makes it smaller where it would leave them; `sysid.excitation.separation` tells which effects
 it can show and tell apart.
 """
 
@@ -14,7 +14,7 @@ from jaxtyping import Float
 
 from envs.errors import InputError, one_of
 from envs.quiet_mujoco import mujoco
-from sysid.excite_waves import WAVES
+from sysid.excitation.waves import WAVES
 from sysid.mechanism import Mechanism
 
 REST_S = 0.5

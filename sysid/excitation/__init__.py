@@ -1,0 +1,1 @@
+"""What to record, so that effects can be identified."""
