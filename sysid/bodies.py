@@ -6,8 +6,8 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.quiet_mujoco import mujoco
-from sysid.data import MeasuredLog
 from sysid.diagnosis.measured.segments import Piece
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 
 PAYLOAD = "payload"

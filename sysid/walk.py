@@ -20,7 +20,7 @@ from jaxtyping import Float, Int
 
 from envs.actuator.effects.mount_tilt import tilted
 from envs.batch import BatchEnv
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 from sysid.result import Diagnosis
 from sysid.search_fit import Search
 from sysid.walk_record import walk_record

@@ -15,7 +15,7 @@ from scipy.signal import savgol_filter
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.hand.figures import figures
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 
 _AXES = ("x", "y", "z")
 _WINDOW, _ORDER = 5, 2

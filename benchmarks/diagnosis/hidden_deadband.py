@@ -23,8 +23,8 @@ from envs.hand.hand_file import (
     load_hand_file,
     save_hand_file,
 )
-from sysid.data import MeasuredLog
-from sysid.data_read import write_log
+from sysid.logs.log import MeasuredLog
+from sysid.logs.read import write_log
 
 HALF_WIDTH_RAD = 0.04
 RATE_HZ, ROUND_S, ROUNDS = 200.0, 12.0, 3

@@ -26,7 +26,7 @@ from scipy.signal import lfilter
 
 from sysid.calibration.record import joint_record
 from sysid.calibration.simulation import Motion
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 from sysid.search_fit import Search
 

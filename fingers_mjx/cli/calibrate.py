@@ -7,8 +7,8 @@ from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli.excite import mechanism_of
 from sysid.calibration.calibrate import Calibration, calibrate, calibrated_hand
 from sysid.calibration.figures import write_figures
-from sysid.data_bag import BagMap
-from sysid.data_read import read_log
+from sysid.logs.bag import BagMap
+from sysid.logs.read import read_log
 
 
 def run(args: argparse.Namespace) -> int:

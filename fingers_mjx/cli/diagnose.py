@@ -8,10 +8,10 @@ from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli.diagnose_walk import run_walk, walks
 from fingers_mjx.cli.excite import mechanism_of
 from fingers_mjx.evaluation.files import write_atomic
-from sysid.data_bag import BagMap
-from sysid.data_read import read_log
 from sysid.diagnosis.diagnose import examine
 from sysid.diagnosis.verdict.hand import extended_hand
+from sysid.logs.bag import BagMap
+from sysid.logs.read import read_log
 
 
 def run(args: argparse.Namespace) -> int:

@@ -11,8 +11,8 @@ from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.ppo.config import preset
 from fingers_mjx.runs.setup import Setup, make_env, new_setup
-from sysid.data import MeasuredLog
 from sysid.diagnosis.verdict.hand import extended_hand
+from sysid.logs.log import MeasuredLog
 from sysid.walk import diagnose_walk
 from sysid.walk_space import whole_hand
 

@@ -3,9 +3,9 @@
 import argparse
 
 from envs.config.typed import load_yaml
-from sysid.data_bag import BagMap
-from sysid.data_info import info_lines
-from sysid.data_read import read_log
+from sysid.logs.bag import BagMap
+from sysid.logs.info import info_lines
+from sysid.logs.read import read_log
 
 
 def run(args: argparse.Namespace) -> int:

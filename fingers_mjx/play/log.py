@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from envs.hand.figures import figures
 from envs.physics import PhysicsState
 from fingers_mjx.play.player import Played, Player, Schedule
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 
 _AXES = ("x", "y", "z")
 

@@ -22,7 +22,7 @@ from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile, JointQuantity, Quantity
 from sysid.calibration.friction import Pull, is_pull, pull_of
 from sysid.calibration.joint import JointFit, fit_joint
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 from sysid.result import Estimate
 

@@ -11,8 +11,8 @@ from jaxtyping import Float
 from scipy.ndimage import uniform_filter1d
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
-from sysid.data_columns import FINGERS
+from sysid.logs.columns import FINGERS
+from sysid.logs.log import MeasuredLog
 
 SETTING = "normal_n"
 """Setting of a log's header that marks a pull and tells the normal force [N]."""

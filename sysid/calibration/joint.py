@@ -15,7 +15,7 @@ from jaxtyping import Float
 from envs.errors import InputError
 from sysid.calibration.record import Record, joint_record
 from sysid.calibration.simulation import SERVO, Motion
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
 
 FIGURES: tuple[str, ...] = (

@@ -8,9 +8,9 @@ from jaxtyping import Bool, Float
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
 from sysid.calibration.neighbours import Neighbours, neighbours_along
-from sysid.data import MeasuredLog
-from sysid.data_timing import continuous_parts
 from sysid.excitation.plan import rest_posture
+from sysid.logs.log import MeasuredLog
+from sysid.logs.timing import continuous_parts
 from sysid.mechanism import Mechanism
 from sysid.rigid import gravity_torque, rigid_along
 

@@ -17,12 +17,12 @@ from functools import partial
 import numpy as np
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
 from sysid.diagnosis.replay.track import JointTrack, all_tracks
 from sysid.diagnosis.search.parameters import make_space
 from sysid.diagnosis.search.problem import Problem, make_problem
 from sysid.diagnosis.search.search import Search, search
 from sysid.diagnosis.verdict.verdict import verdict_of
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 from sysid.result import Diagnosis
 

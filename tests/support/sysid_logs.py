@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sysid.data import Load, make_log
+from sysid.logs.log import Load, make_log
 
 
 def small_log(rows=50, joints=("knee", "hip"), **header):

@@ -19,8 +19,8 @@ from fingers_mjx.play.episodes import schedule_of
 from fingers_mjx.play.log import WalkNoise, WalkRecorder
 from fingers_mjx.policy.source import load_bundle_setup
 from fingers_mjx.runs.setup import make_env
-from sysid.data import make_log
-from sysid.data_read import write_log
+from sysid.logs.log import make_log
+from sysid.logs.read import write_log
 from sysid.walk_record import walk_record
 from sysid.walk_simulation import Pieces
 from sysid.walk_space import axes, candidate, hypotheses

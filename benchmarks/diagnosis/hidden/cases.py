@@ -21,7 +21,7 @@ from benchmarks.diagnosis.hidden.stands import (
     slightly_wrong,
 )
 from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 
 RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
 SLOW = ("thermal_derating", "clock_drift", "packet_reorder")

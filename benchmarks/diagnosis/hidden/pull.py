@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 
 _MODEL = """
 <mujoco><option timestep="0.0005" cone="elliptic" impratio="20"/>

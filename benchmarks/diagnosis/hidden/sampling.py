@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.diagnosis.hidden.recording import Recording
 from benchmarks.diagnosis.hidden.simulate import Motion, simulate
 from benchmarks.diagnosis.hidden.truth import Mechanism
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 
 
 @dataclass(frozen=True)

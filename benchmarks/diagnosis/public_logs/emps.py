@@ -12,7 +12,7 @@ import numpy as np
 import scipy.io
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 
 FILES = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
 _NEEDED = ("t", "qm", "qg", "vir", "gtau", "kp", "kv")

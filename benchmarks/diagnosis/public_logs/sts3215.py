@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from envs.errors import InputError, one_of
-from sysid.data import MeasuredLog, make_log
+from sysid.logs.log import MeasuredLog, make_log
 
 COUNTS_PER_TURN = 4096
 RAD_PER_COUNT = 2.0 * np.pi / COUNTS_PER_TURN

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from envs.errors import InputError
-from sysid.data import Load, MeasuredLog, make_log
+from sysid.logs.log import Load, MeasuredLog, make_log
 
 PWM_FULL = 885.0
 """Present PWM of the servo at full duty [counts]."""

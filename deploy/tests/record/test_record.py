@@ -8,8 +8,8 @@ from fingers_deploy.errors import InputError
 from fingers_robot.record import read_log
 from fingers_robot.record.recorder import Recorder
 from fingers_robot.record.row import NAMES, ROW, empty_row, schema_text
-from sysid.data_bag import BagMap
-from sysid.data_read import read_log as read_measured_log
+from sysid.logs.bag import BagMap
+from sysid.logs.read import read_log as read_measured_log
 
 JOINTS = tuple(f"finger{f}_joint{j}" for f in range(1, 6) for j in range(1, 5))
 

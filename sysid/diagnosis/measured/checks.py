@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 
 BEYOND_RAD = 0.5

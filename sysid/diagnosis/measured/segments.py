@@ -13,14 +13,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
-from sysid.data_timing import column_timing, continuous_parts
 from sysid.diagnosis.measured.resampling import (
     SMOOTH_STEPS,
     held_targets,
     shares,
     smoothed,
 )
+from sysid.logs.log import MeasuredLog
+from sysid.logs.timing import column_timing, continuous_parts
 from sysid.mechanism import JointDrive
 
 GRID_S = 0.004

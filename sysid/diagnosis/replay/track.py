@@ -9,7 +9,6 @@ from jaxtyping import Bool, Float, Int
 
 from envs.errors import InputError, one_of
 from sysid.bodies import bodies_along
-from sysid.data import MeasuredLog
 from sysid.diagnosis.measured.checks import check_records
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.measured.segments import (
@@ -21,6 +20,7 @@ from sysid.diagnosis.measured.segments import (
 )
 from sysid.diagnosis.replay.residuals import BAND_STEPS, EVERY, Track, sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import sampling_doubt, timing_doubt
+from sysid.logs.log import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
 
 

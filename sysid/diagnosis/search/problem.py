@@ -13,10 +13,10 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sysid.data import MeasuredLog
 from sysid.diagnosis.replay.residuals import EVERY, forced_residuals, sample_rows
 from sysid.diagnosis.replay.track import JointTrack, band_noise
 from sysid.diagnosis.search.parameters import Space
+from sysid.logs.log import MeasuredLog
 
 ORDER = 4
 LANES = 64

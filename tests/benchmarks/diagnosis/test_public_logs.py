@@ -16,7 +16,7 @@ from benchmarks.diagnosis.public_logs.emps import FILES, load_emps
 from benchmarks.diagnosis.public_logs.sts3215 import RAD_PER_COUNT, load_sts3215
 from benchmarks.diagnosis.public_logs.xl330 import load_xl330
 from envs.errors import InputError
-from sysid.data_timing import timing
+from sysid.logs.timing import timing
 
 REAL = os.environ.get("FINGERS_REAL_DATA", "")
 real = pytest.mark.skipif(not REAL, reason="FINGERS_REAL_DATA names no folder")

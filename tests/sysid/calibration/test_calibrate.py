@@ -15,7 +15,7 @@ from envs.hand.hand_file import load_hand_file, save_hand_file
 from sysid.calibration.calibrate import calibrate, calibrated_hand, weighed_mean
 from sysid.calibration.figures import write_figures
 from sysid.calibration.friction import pull_of
-from sysid.data import make_log
+from sysid.logs.log import make_log
 from sysid.mechanism import hand_mechanism
 
 NOISE = Noise(torque_sd_nm=2e-3)

@@ -6,9 +6,9 @@ import pytest
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
 from fingers_mjx.cli.main import main
-from sysid.data import make_log
-from sysid.data_read import write_log
 from sysid.diagnosis.diagnose import diagnose
+from sysid.logs.log import make_log
+from sysid.logs.read import write_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 
 ARM = """

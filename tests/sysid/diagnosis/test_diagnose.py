@@ -20,9 +20,9 @@ from benchmarks.diagnosis.hidden.stands import make_stand
 from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from envs.hand.hand_file import load_hand_file
 from fingers_mjx.cli.main import main
-from sysid.data import MeasuredLog, make_log
-from sysid.data_read import write_log
 from sysid.diagnosis.diagnose import diagnose
+from sysid.logs.log import MeasuredLog, make_log
+from sysid.logs.read import write_log
 from sysid.mechanism import Figure
 
 SEED = random.SystemRandom().randrange(10**6)

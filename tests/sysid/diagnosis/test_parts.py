@@ -12,7 +12,6 @@ from benchmarks.diagnosis.hidden.cases import draw_case
 from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
-from sysid.data import make_log
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.measured.resampling import held_targets, shares, smoothed
 from sysid.diagnosis.measured.segments import grid_step_s, pieces_of
@@ -21,6 +20,7 @@ from sysid.diagnosis.replay.link import link_step, spring_noise
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.parameters import make_space
 from sysid.diagnosis.search.search import settled
+from sysid.logs.log import make_log
 from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
 
 STAND = """

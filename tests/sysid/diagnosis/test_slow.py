@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from envs.quiet_mujoco import mujoco
-from sysid.data import make_log
 from sysid.diagnosis.diagnose import diagnose
+from sysid.logs.log import make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 
 SEED = int.from_bytes(np.random.default_rng().bytes(3))

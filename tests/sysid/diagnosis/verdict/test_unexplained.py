@@ -10,7 +10,6 @@ from benchmarks.diagnosis.hidden.cases import draw_case
 from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand
-from sysid.data import make_log
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.measured.segments import grid_step_s
 from sysid.diagnosis.replay.track import all_tracks
@@ -20,6 +19,7 @@ from sysid.diagnosis.search.coupling import beside, coupled
 from sysid.diagnosis.search.search import Search, settled
 from sysid.diagnosis.search.starts import starts_of
 from sysid.diagnosis.verdict.unexplained import _jumps, left_over
+from sysid.logs.log import make_log
 
 
 @pytest.fixture(scope="module")

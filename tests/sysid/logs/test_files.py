@@ -3,8 +3,8 @@ import pytest
 from support.sysid_logs import small_log
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
-from sysid.data_read import read_log, write_log
+from sysid.logs.log import MeasuredLog
+from sysid.logs.read import read_log, write_log
 
 GOOD = """\
 # joints: [knee]

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
+from sysid.logs.log import MeasuredLog
 
 GAP_FACTOR = 2.5
 

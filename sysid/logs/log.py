@@ -2,7 +2,7 @@
 
 A log keeps what was recorded, as it was recorded. A reading that is missing is NaN in
 its row; rows stand in the order of the recording at their own times; gaps, repeated and
-backward times stay, and `sysid.data_timing` reports them. Nothing is filled in, sorted,
+backward times stay, and `sysid.logs.timing` reports them. Nothing is filled in, sorted,
 or converted.
 """
 
@@ -19,7 +19,7 @@ from jaxtyping import Bool, Float
 
 from envs.config.typed import to_dict
 from envs.errors import InputError, one_of
-from sysid.data_columns import (
+from sysid.logs.columns import (
     QUANTITIES,
     check_columns,
     checked_units,

@@ -4,9 +4,9 @@ from support.sysid_logs import small_log
 
 from envs.errors import InputError
 from fingers_mjx.cli.main import main
-from sysid.data import make_log
-from sysid.data_info import info_lines
-from sysid.data_read import write_log
+from sysid.logs.info import info_lines
+from sysid.logs.log import make_log
+from sysid.logs.read import write_log
 
 
 def test_info_tells_what_is_irregular():

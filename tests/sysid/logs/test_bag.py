@@ -6,9 +6,9 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_typestore
 
 from envs.errors import InputError
-from sysid.data_bag import BagMap
-from sysid.data_read import read_log
-from sysid.data_timing import column_timing
+from sysid.logs.bag import BagMap
+from sysid.logs.read import read_log
+from sysid.logs.timing import column_timing
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 MSG = TYPES.types

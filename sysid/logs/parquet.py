@@ -9,7 +9,7 @@ import numpy as np
 
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
-from sysid.data import LogHeader, MeasuredLog
+from sysid.logs.log import LogHeader, MeasuredLog
 
 METADATA_KEY = b"fingers.measured_log"
 MAX_CELLS = 500_000_000

@@ -21,7 +21,7 @@ import numpy as np
 from envs.config.strict_yaml import parse_yaml
 from envs.config.typed import dump_yaml, from_dict, load_yaml
 from envs.errors import InputError
-from sysid.data import LogHeader, MeasuredLog
+from sysid.logs.log import LogHeader, MeasuredLog
 
 MAX_BYTES = 2 << 30
 _MAX_HEADER_LINES = 1000

@@ -3,8 +3,8 @@ import pytest
 from support.sysid_logs import small_log
 
 from envs.errors import InputError
-from sysid.data import LogHeader, MeasuredLog, make_log
-from sysid.data_timing import column_timing, continuous_parts, resampled, timing
+from sysid.logs.log import LogHeader, MeasuredLog, make_log
+from sysid.logs.timing import column_timing, continuous_parts, resampled, timing
 
 ROWS = 4
 T = np.arange(ROWS) * 0.01

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from sysid.data import MeasuredLog
-from sysid.data_columns import quantity_of
-from sysid.data_timing import column_timing
+from sysid.logs.columns import quantity_of
+from sysid.logs.log import MeasuredLog
+from sysid.logs.timing import column_timing
 
 
 def info_lines(log: MeasuredLog) -> list[str]:

@@ -14,9 +14,9 @@ from typing import Any, Literal
 import numpy as np
 
 from envs.errors import InputError, one_of
-from sysid.data import Load, LogHeader, MeasuredLog
-from sysid.data_columns import standard_units
-from sysid.data_messages import READERS
+from sysid.logs.columns import standard_units
+from sysid.logs.log import Load, LogHeader, MeasuredLog
+from sysid.logs.ros_messages import READERS
 
 MAX_MESSAGES = 20_000_000
 _VALID = "the folder of a ROS 2 bag, or an MCAP file written by ROS 2"

@@ -3,10 +3,10 @@
 from pathlib import Path
 
 from envs.errors import InputError
-from sysid.data import MeasuredLog
-from sysid.data_bag import BagMap, read_bag
-from sysid.data_csv import read_csv, write_csv
-from sysid.data_parquet import read_parquet, write_parquet
+from sysid.logs.bag import BagMap, read_bag
+from sysid.logs.csv_file import read_csv, write_csv
+from sysid.logs.log import MeasuredLog
+from sysid.logs.parquet import read_parquet, write_parquet
 
 _READ = {".csv": read_csv, ".parquet": read_parquet}
 _WRITE = {".csv": write_csv, ".parquet": write_parquet}

@@ -22,7 +22,7 @@ from support.log_damage import HOSTILE, csv_damage, flipped, torn
 from support.sysid_logs import small_log
 
 from fingers_mjx.cli.main import main
-from sysid.data_read import read_log, write_log
+from sysid.logs.read import read_log, write_log
 
 FEW, MANY = 100, 3000
 SLOWEST_S, MOST_BYTES = 10.0, 1 << 30

@@ -1,0 +1,1 @@
+"""Measured logs: reading, columns, timing."""
