@@ -13,8 +13,8 @@ from fingers_mjx.ppo.config import preset
 from fingers_mjx.runs.setup import Setup, make_env, new_setup
 from sysid.diagnosis.verdict.hand import extended_hand
 from sysid.logs.log import MeasuredLog
-from sysid.walk import diagnose_walk
-from sysid.walk_space import whole_hand
+from sysid.walking.diagnose import diagnose_walk
+from sysid.walking.hypotheses import whole_hand
 
 
 def walks(logs: Sequence[MeasuredLog]) -> bool:

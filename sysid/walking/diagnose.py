@@ -2,7 +2,7 @@
 
     diagnosis = diagnose_walk(read_log("walk.parquet"), env)
 
-Every hypothesis of `sysid.walk_space` is fitted on half of the walk, in stretches of
+Every hypothesis of `sysid.walking.hypotheses` is fitted on half of the walk, in stretches of
 five seconds, and judged on the other half, and the other way round:
 
     r = [short walks missed, gyro − turning − b, R g − down(tilt)] / scatter
@@ -23,10 +23,10 @@ from envs.batch import BatchEnv
 from sysid.logs.log import MeasuredLog
 from sysid.result import Diagnosis
 from sysid.search_fit import Search
-from sysid.walk_record import walk_record
-from sysid.walk_simulation import LOOKS, PIECE_STEPS, Pieces
-from sysid.walk_space import Hypothesis, axes, candidate, hypotheses
-from sysid.walk_verdict import BOUND, Judged, verdict_of
+from sysid.walking.hypotheses import Hypothesis, axes, candidate, hypotheses
+from sysid.walking.record import walk_record
+from sysid.walking.simulation import LOOKS, PIECE_STEPS, Pieces
+from sysid.walking.verdict import BOUND, Judged, verdict_of
 
 STRETCH_S = 5.0
 FULL = 3
@@ -99,8 +99,8 @@ def diagnose_walk(
     """Compares a walk with the simulation and names the cause of the difference.
 
     Args:
-        log: of a free hand; see `sysid.walk_record.walk_record`.
-        env: worlds of a task with the hand of `sysid.walk_space.whole_hand`.
+        log: of a free hand; see `sysid.walking.record.walk_record`.
+        env: worlds of a task with the hand of `sysid.walking.hypotheses.whole_hand`.
         tell: hears what is being done.
 
     Returns:

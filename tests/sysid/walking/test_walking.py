@@ -21,10 +21,10 @@ from fingers_mjx.policy.source import load_bundle_setup
 from fingers_mjx.runs.setup import make_env
 from sysid.logs.log import make_log
 from sysid.logs.read import write_log
-from sysid.walk_record import walk_record
-from sysid.walk_simulation import Pieces
-from sysid.walk_space import axes, candidate, hypotheses
-from sysid.walk_verdict import Judged, verdict_of
+from sysid.walking.hypotheses import axes, candidate, hypotheses
+from sysid.walking.record import walk_record
+from sysid.walking.simulation import Pieces
+from sysid.walking.verdict import Judged, verdict_of
 
 CRAWL = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 COMMANDS = [(0.10, 0.0, 0.0), (0.08, 0.05, 0.0), (0.10, 0.0, 0.3), (0.10, 0.0, 0.0)]

@@ -18,7 +18,7 @@ from mujoco import rollout
 from envs.batch import BatchEnv
 from envs.physics.base import nominal_field
 from envs.quiet_mujoco import mujoco
-from sysid.walk_record import WalkRecord
+from sysid.walking.record import WalkRecord
 
 PIECE_STEPS, LOOKS = 10, (5, 10)
 """Control steps of a piece, and after how many of them it is compared."""

@@ -9,7 +9,7 @@ from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from sysid.result import Alternative, Cause, Estimate, Gain
-from sysid.walk_space import Axis, Hypothesis
+from sysid.walking.hypotheses import Axis, Hypothesis
 
 SURE = 3.0
 """Standard errors by which a held-out gain must exceed zero, or that of a rival."""
