@@ -7,24 +7,27 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-OURS = ("rewards", "envs", "sysid", "fingers_mjx", "fingers_deploy")
+OURS = ("rewards", "envs", "sysid", "fingers_mjx", "fingers_deploy", "fingers_robot")
 PACKAGES = {
     "rewards": ROOT / "rewards",
     "envs": ROOT / "envs",
     "sysid": ROOT / "sysid",
     "fingers_mjx": ROOT / "fingers_mjx",
     "fingers_deploy": ROOT / "deploy" / "fingers_deploy",
+    "fingers_robot": ROOT / "deploy" / "fingers_robot",
 }
 MAY_IMPORT = {
     "rewards": (),
     "envs": ("rewards",),
     "sysid": ("rewards", "envs"),
-    "fingers_mjx": ("rewards", "envs", "sysid", "fingers_deploy"),
+    "fingers_mjx": ("rewards", "envs", "sysid", "fingers_deploy", "fingers_robot"),
     "fingers_deploy": (),
+    "fingers_robot": ("fingers_deploy",),
 }
 ARRAYS = {"jax", "numpy", "jaxtyping", "flax"}
-ROBOT = {"numpy", "onnxruntime", "wujihandpy", "mujoco"}  # mujoco: in its simulator
-FOREIGN = {"rewards": ARRAYS, "fingers_deploy": ROBOT}
+SHIM = {"numpy", "onnxruntime"}
+ROBOT = {"numpy", "wujihandpy", "mujoco"}  # mujoco: in its simulator
+FOREIGN = {"rewards": ARRAYS, "fingers_deploy": SHIM, "fingers_robot": ROBOT}
 """Third parties of the packages that are used far from a simulator."""
 
 
@@ -67,6 +70,8 @@ def test_imports_point_down(package):
         ("rewards", "import mujoco", ["mujoco"]),
         ("fingers_deploy", "import jax", ["jax"]),
         ("fingers_deploy", "from fingers_deploy.wire import x", []),
+        ("fingers_deploy", "import fingers_robot.reading", ["fingers_robot"]),
+        ("fingers_robot", "from fingers_deploy.wire import x", []),
     ],
 )
 def test_a_wrong_import_is_found(package, source, found):

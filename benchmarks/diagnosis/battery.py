@@ -1,6 +1,6 @@
 """Hides effects, asks the diagnosis, and prints how often it was right.
 
-    python -m benchmarks.diagnosis.battery --seed 7 --records 100 --workers 2 --out battery
+    python -m benchmarks.diagnosis.battery --seed 7 --records 100 --out battery
 
 Every case is drawn from the seed and its number, so one of them can be run again with
 `--only NUMBER`. Rows are written as they come; a second call with the same `--out` and

@@ -9,6 +9,7 @@ from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from scipy.stats import beta
@@ -102,9 +103,10 @@ class Row:
     @staticmethod
     def from_json(line: str) -> "Row":
         """Reads `to_json`."""
-        data = json.loads(line)
+        data: dict[str, Any] = json.loads(line)
         lists = ("effects", "causes", "where", "rivals", "others", "not_observable")
-        return Row(**{k: tuple(v) if k in lists else v for k, v in data.items()})
+        data |= {name: tuple(data[name]) for name in lists}
+        return Row(**data)
 
 
 def upper_bound(events: int, trials: int, level: float = 0.95) -> float:

@@ -44,7 +44,7 @@ def largest_gains(seed: int) -> dict:
 
 def main() -> None:
     """Runs from the command line."""
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--records", type=int, default=100)
     parser.add_argument("--out", type=Path, default=Path("build/thresholds.jsonl"))

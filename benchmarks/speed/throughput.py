@@ -1,7 +1,7 @@
 """Throughput of bare physics, environment and PPO of the same model in one run.
 
     python -m benchmarks.speed.throughput --backend cpu --against jax
-    python -m benchmarks.speed.throughput --backend warp --num-envs 8192 --json warp.json
+    python -m benchmarks.speed.throughput --backend warp --num-envs 8192
 
 Prints control steps per second of all worlds together (four physics steps each) and
 the ratio to bare physics, which is native batch stepping: `mujoco.batch.Batch` for cpu,
@@ -103,7 +103,8 @@ def _apart(
             options = ["--task", args.task, "--backend", backend]
             options += ["--num-envs", str(worlds), "--seconds", str(args.seconds)]
             options += ["--json", str(record), "--layers", name]
-            subprocess.run([sys.executable, __file__, *options], check=True)
+            program = [sys.executable, "-m", "benchmarks.speed.throughput"]
+            subprocess.run([*program, *options], check=True)
             row = json.loads(record.read_text(encoding="utf-8"))["layers"][0]
         rates[backend, name], notes[backend, name] = row["steps_per_s"], row["note"]
     return rates, notes

@@ -92,7 +92,7 @@ def _train(commands) -> None:
     parser = _command(
         commands,
         "train",
-        "cli_train",
+        "train",
         "train a policy",
         "Shows progress live on a terminal, as JSON lines otherwise. SIGINT saves and "
         "stops; --resume goes on.",
@@ -128,7 +128,7 @@ def _eval(commands) -> None:
     parser = _command(
         commands,
         "eval",
-        "cli_eval",
+        "evaluate",
         "measure a policy in many randomized episodes",
         "Prints the paper's measures; for a run directory, writes summary, table of "
         "episodes and figures to RUN/eval unless --out says otherwise.",
@@ -153,7 +153,7 @@ def _export(commands) -> None:
     parser = _command(
         commands,
         "export",
-        "cli_export",
+        "export",
         "write the policy of a run as a bundle",
         "policy.onnx, manifest.json, config.yaml and hand.yaml; fails if ONNX Runtime "
         "and JAX differ by more than 1e-5.",
@@ -168,7 +168,7 @@ def _play(commands) -> None:
     parser = _command(
         commands,
         "play",
-        "cli_play",
+        "play",
         "close the loop in plain C MuJoCo through the deployment shim",
         "Physics at 200 Hz, the exported policy at 50 Hz through fingers_deploy; the "
         "training environment takes no part.",
@@ -235,11 +235,11 @@ def _play(commands) -> None:
 
 def _add_hand(commands) -> None:
     summary = "look at the hand and its stance, or bring a hand of your own"
-    add_hand(_command(commands, "hand", "cli_hand", summary), _seed, whole)
+    add_hand(_command(commands, "hand", "hand", summary), _seed, whole)
 
 
 def _sysid(commands) -> None:
-    parser = _command(commands, "sysid", "cli_sysid", "look at measured logs")
+    parser = _command(commands, "sysid", "log_info", "look at measured logs")
     actions = parser.add_subparsers(metavar="ACTION", required=True, dest="action")
     info = actions.add_parser(
         "info",
@@ -260,7 +260,7 @@ def _demo(commands) -> None:
     parser = _command(
         commands,
         "demo",
-        "cli_demo",
+        "demo",
         "see everything once, in minutes, without a GPU",
         "Evaluates and plays the committed policy, trains a small one, exports it, and "
         "writes one report.html.",

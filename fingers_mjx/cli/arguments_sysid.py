@@ -14,7 +14,7 @@ def add_excite(actions, whole: Callable, number: Callable) -> None:
         "it, and which effects it can show and tell apart.",
         allow_abbrev=False,
     )
-    parser.set_defaults(module="cli_sysid_excite")
+    parser.set_defaults(module="excite")
     add_mechanism(parser)
     parser.add_argument(
         "--joints",
@@ -70,7 +70,7 @@ def add_calibrate(actions) -> None:
         "force.<finger>). Writes hand.yaml, calibration.json and pictures.",
         allow_abbrev=False,
     )
-    parser.set_defaults(module="cli_sysid_calibrate")
+    parser.set_defaults(module="calibrate")
     parser.add_argument(
         "logs", type=Path, nargs="+", metavar="LOG", help="CSV, Parquet, MCAP, bag"
     )
@@ -104,7 +104,7 @@ def add_diagnose(actions, whole: Callable, number: Callable) -> None:
         "OUT/hand.yaml with the effects in it.",
         allow_abbrev=False,
     )
-    parser.set_defaults(module="cli_sysid_diagnose")
+    parser.set_defaults(module="diagnose")
     parser.add_argument(
         "logs", nargs="+", type=Path, metavar="LOG", help="CSV, Parquet, MCAP, bag"
     )

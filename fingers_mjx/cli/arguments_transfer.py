@@ -14,7 +14,7 @@ def add_transfer(actions, whole: Callable, settings: Callable, backend: Callable
         "hand: task speed, drift, survival. Writes OUT/transfer.json beside both runs.",
         allow_abbrev=False,
     )
-    parser.set_defaults(module="cli_transfer")
+    parser.set_defaults(module="transfer")
     parser.add_argument(
         "--real",
         type=Path,

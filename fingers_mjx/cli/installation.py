@@ -29,7 +29,7 @@ def check_installation() -> None:
         UnsupportedInstallation: naming the first package, what was found and what
             would be valid.
     """
-    check_places(Path(__file__).parents[1])
+    check_places(Path(__file__).parents[2])
     try:
         own = metadata.metadata(DISTRIBUTION)
     except metadata.PackageNotFoundError:

@@ -39,7 +39,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
         warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
         importlib.import_module("envs.physics.quiet_mjx")
-        command = importlib.import_module(f"fingers_mjx.{args.module}")
+        command = importlib.import_module(f"fingers_mjx.cli.{args.module}")
         return command.run(args)
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)

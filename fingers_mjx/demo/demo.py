@@ -10,7 +10,7 @@ from fingers_mjx.demo.screen import Screen
 from fingers_mjx.demo.show import ShowSize, show
 from fingers_mjx.policy.source import PolicySource, load_bundle_setup
 
-POLICY_DIR = Path(__file__).with_name("policies") / "crawl"
+POLICY_DIR = Path(__file__).parents[1] / "policies" / "crawl"
 """The committed crawl policy."""
 
 

@@ -1,7 +1,7 @@
 """The one module that imports Brax: its PPO networks, loss, rate and normalizer.
 
 Brax's own `ppo.train` is one function that cannot save or restore the whole training
-state, so the iteration (`fingers_mjx.ppo.iteration`) is built here from Brax's parts instead.
+state, so `fingers_mjx.ppo.iteration` is built from Brax's parts instead.
 """
 
 import functools

@@ -211,7 +211,7 @@ def _version(package: str) -> str:
 
 def _commit() -> str:
     """Returns the commit of the source tree, or an empty string if it has none."""
-    here = Path(__file__).parent
+    here = Path(__file__).parents[1]
     command = ["git", "-C", str(here), "rev-parse", "HEAD"]
     try:
         done = subprocess.run(command, capture_output=True, timeout=10, check=True)

@@ -66,10 +66,11 @@ def train(
         hand: written beside both.
         resume: go on from the newest intact checkpoint.
         warm_start: run directory, checkpoint or bundle whose networks the new run
-            starts from (`fingers_mjx.training.warm_start`); everything else starts afresh.
+            starts from (`fingers_mjx.training.warm_start`); all else starts afresh.
         identity: JSON-able facts that a resumed run must share besides configuration
             and sizes, such as the hash of the model and the order of observations.
-        on_progress: told the events of `fingers_mjx.training.progress`, from any thread.
+        on_progress: gets the events of `fingers_mjx.training.progress`, from any
+            thread.
 
     Raises:
         InputError: for settings, directories or checkpoints that do not fit, or when

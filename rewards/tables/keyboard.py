@@ -1,9 +1,10 @@
 """Reward table of keyboard pressing.
 
 The rows bind attributes of `envs.signals.Signals` and the task's own signals, see
-`envs.tasks.keyboard.task.Keyboard.scene_signals`. The paper names the goals and penalties and
-gives no weight; all weights are ours. Rows of single events (`hit`, `wrong`, `stray`,
-`stance_lost`) are paid once: at an interval of 20 ms a weight of 250 is 5 per event.
+`envs.tasks.keyboard.task.Keyboard.scene_signals`. The paper names the goals and
+penalties and gives no weight; all weights are ours. Rows of single events (`hit`,
+`wrong`, `stray`, `stance_lost`) are paid once: at an interval of 20 ms a weight of 250
+is 5 per event.
 
 A pending request costs by distance and ends with the first key event, right or wrong.
 The wrong key must cost more than the rest of the time would, and more once the hand

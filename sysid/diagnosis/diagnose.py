@@ -3,8 +3,8 @@
     diagnosis = diagnose([read_log("knee.csv")], hand_mechanism(), seed=0)
     print(diagnosis.to_json())
 
-Every joint is searched for itself (`sysid.diagnosis.search.search`); effects that several
-joints share are told once, with where they act.
+Every joint is searched for itself (`sysid.diagnosis.search.search`); effects that
+several joints share are reported once, with where they act.
 """
 
 import os

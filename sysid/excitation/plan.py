@@ -2,8 +2,8 @@
 
 A plan moves joints or groups of joints through waves, each repeated, inside the limits
 of position, speed and torque. `sysid.excitation.check` simulates it with collisions and
-makes it smaller where it would leave them; `sysid.excitation.separation` tells which effects
-it can show and tell apart.
+makes it smaller where it would leave them; `sysid.excitation.separation` computes which
+effects it excites, and which it distinguishes.
 """
 
 from collections.abc import Mapping, Sequence

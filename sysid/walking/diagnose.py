@@ -2,8 +2,8 @@
 
     diagnosis = diagnose_walk(read_log("walk.parquet"), env)
 
-Every hypothesis of `sysid.walking.hypotheses` is fitted on half of the walk, in stretches of
-five seconds, and judged on the other half, and the other way round:
+Every hypothesis of `sysid.walking.hypotheses` is fitted on half of the walk, in
+stretches of five seconds, and judged on the other half, and the other way round:
 
     r = [short walks missed, gyro − turning − b, R g − down(tilt)] / scatter
 

@@ -2,10 +2,10 @@
 
 import dataclasses
 
-import effects_hand as rig
 import jax
 import numpy as np
 import pytest
+from support import effects_hand as rig
 from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.drive.chain import ChainState

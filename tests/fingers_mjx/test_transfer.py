@@ -4,9 +4,9 @@ import dataclasses
 import json
 from typing import Any, cast
 
-import effects_hand as rig
 import numpy as np
 import pytest
+from support import effects_hand as rig
 from support.cli_setup import make_bundle, make_setup
 
 from envs.hand.hand_file import load_hand_file, save_hand_file

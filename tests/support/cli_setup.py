@@ -19,7 +19,7 @@ from fingers_mjx.runs.directory import open_run, record_run
 from fingers_mjx.runs.setup import Setup, config_digest, identity, make_env, new_setup
 from fingers_mjx.training.session import bound
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))
 
 TRAIN = TrainConfig(

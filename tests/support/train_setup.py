@@ -20,7 +20,7 @@ from fingers_mjx.runs.metrics import read_metrics
 from fingers_mjx.training.errors import Interrupted
 from fingers_mjx.training.train import train
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))
 
 PPO = PpoConfig(

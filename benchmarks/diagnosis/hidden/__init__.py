@@ -1,1 +1,1 @@
-"""A simulator of its own that hides effects, so that a diagnosis is not judged by itself."""
+"""A simulator apart from the one that fits: it hides the effects."""

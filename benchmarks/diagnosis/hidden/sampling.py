@@ -55,7 +55,10 @@ def exact(
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angles, torques and speeds at the ticks, without any noise (rows by joints)."""
     motion = simulate(mechanism, times, recording.targets, start)
-    return tuple(_read(mechanism, motion, times, x) for x in _channels(motion))
+    angle, torque, speed = (
+        _read(mechanism, motion, times, x) for x in _channels(motion)
+    )
+    return angle, torque, speed
 
 
 def _channels(motion: Motion):

@@ -136,13 +136,15 @@ def _hand(rng: np.random.Generator, lowpass_hz: float) -> Stand:
     links = tuple(link for m in mechanisms for link in m.links)
     joints = tuple(joint for m in mechanisms for joint in m.joints)
     whole = Mechanism(links, joints, mechanisms[0].base_quat_w)
-    middle, reach = (np.concatenate([f[k] for f in fingers]) for k in (1, 2))
+    middle = np.concatenate([angles for _, angles, _ in fingers])
+    reach = np.concatenate([angles for _, _, angles in fingers])
     return Stand("hand", whole, tuple(range(20)), middle, reach)
 
 
 def changed(mechanism: Mechanism, joint: int, figure: str, by: float) -> Mechanism:
-    """Returns a mechanism with one figure of a joint off by a share (or, the
-    encoder's zero, by an angle).
+    """Returns a mechanism with one parameter of a joint off by a share.
+
+    The encoder's zero is off by an angle instead.
     """
     if figure == "mass":
         masses = list(mechanism.payload_kg or (0.0,) * len(mechanism.links))

@@ -12,7 +12,7 @@ from hand_files import WALKING, marching_bundle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import fingers_deploy
+import fingers_robot
 from fingers_deploy.bundle import load_bundle
 from fingers_robot.record.row import ROW
 from fingers_robot.runtime.core import Core
@@ -20,7 +20,7 @@ from fingers_robot.runtime.ticker import Tick
 from fingers_robot.safety import Mode, Operator
 
 SEED = 7
-PACKAGE = Path(fingers_deploy.__file__).parent
+PACKAGE = Path(fingers_robot.__file__).parent
 
 
 class Sink:

@@ -23,7 +23,7 @@ from envs.hand.figures import FINGERS, figures
 from envs.hand.importing.files import TIMESTEP_S, check_files
 from envs.quiet_mujoco import mujoco
 
-_CHILD = Path(__file__).with_name("custom_child.py")
+_CHILD = Path(__file__).with_name("child.py")
 
 
 @dataclass(frozen=True)

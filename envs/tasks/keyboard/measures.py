@@ -21,7 +21,8 @@ def press_measures(
     supporting tips at the end from where they stood half a second into the episode.
 
     Args:
-        recorded: signals of `envs.tasks.keyboard.task.Keyboard.scene_signals` over T steps.
+        recorded: signals over T steps, see `Keyboard.scene_signals` in
+            `envs.tasks.keyboard.task`.
         counts: the steps that count.
     """
     hit, wrong, timeout, stray = (

@@ -31,4 +31,4 @@ def keyboard_stance(hand: HandFile) -> Stance:
     Raises:
         InputError: the hand does not stand in it.
     """
-    return stance_of(hand, load_stance("envs", "keyboard_stance.json"))
+    return stance_of(hand, load_stance("envs.tasks.keyboard"))

@@ -3,7 +3,7 @@
 The paper names the two sides, the curled fingers and a random heading; curl and lean
 are drawn here (ours). A pose curls the fingers in free fall, so that they meet each
 other as they would, is laid down on its side and settled under its held targets. What
-rolls off its side or still moves is drawn anew. `recovery_falls.json` beside this
+rolls off its side or still moves is drawn anew. `falls.json` beside this
 module is the result for the default hand file.
 """
 
@@ -54,8 +54,9 @@ class Falls:
 
 @cache
 def load_falls() -> Falls:
-    """Reads `recovery_falls.json` beside this file."""
-    raw = json.loads(files("envs").joinpath("recovery_falls.json").read_text("utf-8"))
+    """Reads `falls.json` beside this file."""
+    text = files("envs.tasks.recovery").joinpath("falls.json").read_text("utf-8")
+    raw = json.loads(text)
     rows = {k: tuple(map(tuple, raw[k])) for k in ("qpos", "target_rad")}
     return Falls(**(raw | rows | {"side": tuple(raw["side"])}))
 
@@ -73,7 +74,7 @@ def falls_of(hand: HandFile, stance: Stance) -> Falls:
 
 
 def falls_json(falls: Falls) -> str:
-    """The contents of `recovery_falls.json`, one pose a line."""
+    """The contents of `falls.json`, one pose a line."""
     parts = {k: json.dumps(v) for k, v in vars(falls).items()}
     for name in ("qpos", "target_rad"):
         rows = ",\n  ".join(json.dumps(row) for row in getattr(falls, name))

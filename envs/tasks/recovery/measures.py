@@ -24,8 +24,8 @@ def recovery_measures(
     where the ramp was not over by the end of the episode.
 
     Args:
-        recorded: the signals of `envs.tasks.recovery.task.Recovery.scene_signals` over the
-            control steps.
+        recorded: the signals over the control steps, see `Recovery.scene_signals` in
+            `envs.tasks.recovery.task`.
         counts: the steps that count.
         dt_s: control interval [s].
 

@@ -5,7 +5,7 @@ pays, and exploration from fallen poses alone stays with the palm flat. Poses fr
 along the way down let the policy learn the last part of the way up first (a reverse
 curriculum): some sink from the stance, others tip over toward one of the falls, as a
 hand does that stands on its wrist end and throws its fingers forward. They are ours;
-the paper names none. `recovery_practice.json` beside this module is the result for the
+the paper names none. `practice.json` beside this module is the result for the
 default hand file.
 """
 
@@ -50,8 +50,8 @@ Poses = tuple[tuple[float, ...], ...]
 
 @cache
 def load_practice() -> Poses:
-    """Reads `recovery_practice.json` beside this file: generalized positions."""
-    text = files("envs").joinpath("recovery_practice.json").read_text("utf-8")
+    """Reads `practice.json` beside this file: generalized positions."""
+    text = files("envs.tasks.recovery").joinpath("practice.json").read_text("utf-8")
     return tuple(map(tuple, json.loads(text)))
 
 
@@ -66,7 +66,7 @@ def practice_of(hand: HandFile, stance: Stance) -> Poses:
 
 
 def practice_json(poses: Poses) -> str:
-    """The contents of `recovery_practice.json`, one pose a line."""
+    """The contents of `practice.json`, one pose a line."""
     rows = ",\n ".join(json.dumps(row) for row in poses)
     return f"[\n {rows}\n]\n"
 

@@ -54,8 +54,8 @@ class RecoveryConfig(HandSettings):
             the upright detector has fired. Evaluations do so; in training the policy
             goes on, so that it learns to stay up (paper).
         practice_fraction: share of training episodes that start from a practice pose
-            (`envs.tasks.recovery.practice`) instead of a fall (ours). With `settle` there are
-            none.
+            (`envs.tasks.recovery.practice`) instead of a fall (ours). With `settle`
+            there are none.
     """
 
     command: CommandConfig = field(default_factory=_no_command)

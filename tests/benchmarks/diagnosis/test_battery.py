@@ -1,18 +1,9 @@
 """The battery's own arithmetic, on verdicts that are known."""
 
-import importlib.util
-from pathlib import Path
-
 import pytest
 
+from benchmarks.diagnosis import battery
 from benchmarks.diagnosis.score import Row, confusion, figures, report, upper_bound
-
-SPEC = importlib.util.spec_from_file_location(
-    "battery", Path(__file__).with_name("battery.py")
-)
-assert SPEC is not None and SPEC.loader is not None
-BATTERY = importlib.util.module_from_spec(SPEC)
-SPEC.loader.exec_module(BATTERY)
 
 
 def row(group="single", effects=("backlash",), ratio=2.0, **said):
@@ -87,11 +78,11 @@ def test_rows_read_back_and_are_reported():
 
 
 def test_a_plan_repeats_and_has_all_groups():
-    tasks = BATTERY.plan(5, BATTERY.FULL)
-    assert tasks == BATTERY.plan(5, BATTERY.FULL) != BATTERY.plan(6, BATTERY.FULL)
-    assert len({t.seed for t in tasks}) == len(tasks) == BATTERY.FULL
+    tasks = battery.plan(5, battery.FULL)
+    assert tasks == battery.plan(5, battery.FULL) != battery.plan(6, battery.FULL)
+    assert len({t.seed for t in tasks}) == len(tasks) == battery.FULL
     groups = [t.group for t in tasks]
     assert groups.count("none") >= 200
     singles = {(t.effects[0], t.magnitude) for t in tasks if t.group == "single"}
-    assert len(singles) == 3 * len(BATTERY.CATALOGUE)
+    assert len(singles) == 3 * len(battery.CATALOGUE)
     assert all(len(set(t.effects)) == 2 for t in tasks if t.group == "double")

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis import hidden
 from benchmarks.diagnosis.hidden.cases import draw_case
 from benchmarks.diagnosis.hidden.joint_drive import JointDrive, _Bristle, _Jenkins
 from benchmarks.diagnosis.hidden.recording import Recording, standard
@@ -18,7 +19,7 @@ from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step
 
-FOLDER = Path(__file__).parents[1] / "hidden"
+FOLDER = Path(hidden.__file__).parent
 WEIGHT = Link(
     name="servo",
     pos=(0.0, 0.0, 0.0),

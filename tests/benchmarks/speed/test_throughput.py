@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).parents[1] / "benchmarks" / "throughput.py"
-IDENTIFY = SCRIPT.with_name("identify.py")
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.mark.slow
@@ -27,7 +26,8 @@ def test_throughput_is_measured_and_compared(tmp_path):
         str(out),
     ]
     done = subprocess.run(
-        [sys.executable, str(SCRIPT), *words],
+        [sys.executable, "-m", "benchmarks.speed.throughput", *words],
+        cwd=ROOT,
         capture_output=True,
         text=True,
         check=True,
@@ -46,7 +46,8 @@ def test_throughput_is_measured_and_compared(tmp_path):
 def test_three_parameters_are_found_within_two_percent(tmp_path):
     out = tmp_path / "out.json"
     words = ["--only", "ours", "--seeds", "3", "--json", str(out)]
-    subprocess.run([sys.executable, str(IDENTIFY), *words], check=True)
+    program = [sys.executable, "-m", "benchmarks.diagnosis.identify"]
+    subprocess.run([*program, *words], cwd=ROOT, check=True)
     rows = json.loads(out.read_text(encoding="utf-8"))["rows"]
     assert len(rows) == 3
     names = ("stiffness", "damping", "armature")

@@ -2,11 +2,11 @@
 
 import dataclasses
 
-import effects_hand as rig
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import effects_hand as rig
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError

@@ -1,10 +1,10 @@
 """A hand with effects moves alike on the backends."""
 
-import effects_hand as rig
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import effects_hand as rig
 
 STEPS = 5
 EFFECTS = (

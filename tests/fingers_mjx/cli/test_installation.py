@@ -25,7 +25,7 @@ from fingers_mjx.cli.installation import (
 )
 from fingers_mjx.cli.main import installation, main
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 NEVER = {
     "jax": ["0.10.0", "0.10.1", "0.10.2", "0.11.0", "0.12.0"],
     "jaxlib": ["0.10.0", "0.10.1", "0.10.2", "0.11.0"],

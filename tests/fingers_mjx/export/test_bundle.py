@@ -18,8 +18,8 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
+from fingers_mjx.export import bundle as bundle_module
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
-from fingers_mjx.export.export import bundle as bundle_module
 from fingers_mjx.export.onnx_graph import PolicyWeights
 
 SEED = 23

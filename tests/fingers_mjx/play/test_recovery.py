@@ -12,8 +12,8 @@ from envs.errors import InputError
 from envs.tasks.recovery.falls import Falls
 from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.rotations import gravity
+from fingers_mjx.cli import play as cli_play
 from fingers_mjx.cli.main import main
-from fingers_mjx.cli.main import play as cli_play
 from fingers_mjx.evaluation.source import as_deployed, nominal
 from fingers_mjx.play.behaviours import Behaviours, sticks_for
 from fingers_mjx.play.episodes import play_episodes

@@ -20,13 +20,17 @@ from support.train_setup import assert_same_end, curve, leaves, run
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.training.errors import Interrupted
 
-SCRIPT = Path(train_setup.__file__)
+SUPPORT = Path(train_setup.__file__).parents[1]
 
 
 def start(path, *words):
     settings = {"JAX_PLATFORMS": "cpu", "TF_CPP_MIN_LOG_LEVEL": "3"}
-    environment = os.environ | settings | {"PYTHONPATH": str(train_setup.ROOT)}
-    command = [sys.executable, str(SCRIPT), str(path), *words]
+    environment = (
+        os.environ
+        | settings
+        | {"PYTHONPATH": f"{train_setup.ROOT}{os.pathsep}{SUPPORT}"}
+    )
+    command = [sys.executable, "-m", "support.train_setup", str(path), *words]
     return subprocess.Popen(
         command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment
     )

@@ -77,7 +77,7 @@ def _foreign(name: str, inside: Path) -> bool:
     if name.isdigit():  # a descriptor that is open already
         return False
     file = Path(name).resolve()
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     own = (Path(sys.prefix), Path(sys.base_prefix), root, Path("/sys"), Path("/proc"))
     return not any(file.is_relative_to(p.resolve()) for p in (inside, *own))
 

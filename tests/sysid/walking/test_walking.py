@@ -4,10 +4,10 @@ import dataclasses
 import json
 from pathlib import Path
 
-import effects_hand as rig
 import jax
 import numpy as np
 import pytest
+from support import effects_hand as rig
 
 import fingers_mjx
 from envs.errors import InputError

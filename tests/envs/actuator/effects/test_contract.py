@@ -3,11 +3,11 @@
 import math
 import pkgutil
 
-import effects_rig as rig
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import effects_rig as rig
 
 import envs.actuator.effects
 from envs.actuator.catalogue import CATALOGUE, effect_kind

@@ -1,10 +1,10 @@
 """Each effect against a closed form, or as the limit of a simpler one."""
 
-import effects_rig as rig
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import effects_rig as rig
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import chain_step, init_states

@@ -1,8 +1,8 @@
 """Each effect against a closed form, or as the limit of a simpler one: part two."""
 
-import effects_rig as rig
 import numpy as np
 import pytest
+from support import effects_rig as rig
 
 G = 9.81
 
