@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.errors import InputError
-from envs.physics import mjx, quiet_mjx
+from envs.physics import quiet_mjx
 from envs.physics.base import (
     ModelFields,
     PhysicsOutput,
@@ -18,6 +18,7 @@ from envs.physics.base import (
     check_model,
     nan_if_diverged,
 )
+from envs.physics.quiet_mjx import mjx
 
 
 class MjxPhysics:

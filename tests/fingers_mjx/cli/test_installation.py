@@ -16,6 +16,7 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
+from fingers_mjx.cli import installation
 from fingers_mjx.cli.installation import (
     UnsupportedInstallation,
     check_installation,
@@ -23,7 +24,7 @@ from fingers_mjx.cli.installation import (
     check_python,
     check_requirement,
 )
-from fingers_mjx.cli.main import installation, main
+from fingers_mjx.cli.main import main
 
 ROOT = Path(__file__).parents[3]
 NEVER = {
