@@ -11,7 +11,7 @@ from fingers_mjx.cli.arguments import UsageError, make_parser
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
-    [*ROOT.glob("*.md"), *ROOT.glob("docs/*.md"), ROOT / "deploy/README.md"]
+    [*ROOT.glob("*.md"), *ROOT.glob("docs/*/*.md"), ROOT / "deploy/README.md"]
 )
 PLACES = re.compile(r"/(work|tmp|home|root)/|localhost", re.IGNORECASE)
 
@@ -76,7 +76,7 @@ def test_settings_in_the_training_guide_exist():
     from fingers_mjx.ppo.config import TrainConfig
     from fingers_mjx.runs.setup import new_setup, overridden
 
-    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    text = (ROOT / "docs/guides/training.md").read_text("utf-8")
     (given,) = re.findall(r"`--set ([^`]+)`", text)
     made = overridden(new_setup(TrainConfig(), None), given.split())
     assert (made.train.num_envs, made.env.curriculum_scale) == (2048, 0.25)
@@ -85,7 +85,7 @@ def test_settings_in_the_training_guide_exist():
 def test_presets_in_the_training_guide_are_those_of_the_code():
     from fingers_mjx.ppo.config import PRESETS
 
-    text = (ROOT / "docs" / "training.md").read_text("utf-8")
+    text = (ROOT / "docs/guides/training.md").read_text("utf-8")
     rows = re.findall(
         r"^\| `(\w+)` \|[^|]*\| ([\d,]+) \| ([\d,]+) \|", text, re.MULTILINE
     )
@@ -99,10 +99,10 @@ def test_presets_in_the_training_guide_are_those_of_the_code():
 @pytest.mark.parametrize(
     ("guide", "heading", "table"),
     [
-        ("environment.md", "# ", "CRAWL"),
-        ("tasks.md", "## Fall recovery", "RECOVERY"),
-        ("tasks.md", "## Keyboard pressing", "KEYBOARD"),
-        ("pushing.md", "# ", "PUSH"),
+        ("reference/crawl.md", "# ", "CRAWL"),
+        ("guides/tasks.md", "## Fall recovery", "RECOVERY"),
+        ("guides/tasks.md", "## Keyboard pressing", "KEYBOARD"),
+        ("reference/push.md", "# ", "PUSH"),
     ],
 )
 def test_rewards_in_the_guides_are_those_of_the_code(guide, heading, table):

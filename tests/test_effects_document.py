@@ -1,4 +1,4 @@
-"""`docs/effects.md` tells of the effects that there are."""
+"""`docs/reference/effects.md` tells of the effects that there are."""
 
 import re
 from pathlib import Path
@@ -10,7 +10,7 @@ from envs.actuator.effect import Stage
 from envs.config.typed import from_dict, to_dict
 from envs.hand.hand_file import HandFile, load_hand_file
 
-TEXT = (Path(__file__).parents[1] / "docs" / "effects.md").read_text("utf-8")
+TEXT = (Path(__file__).parents[1] / "docs/reference/effects.md").read_text("utf-8")
 
 
 def test_the_table_is_that_of_the_catalogue():
@@ -27,5 +27,5 @@ def test_all_stages_are_named():
 def test_the_example_is_a_hand_file():
     (example,) = re.findall(r"```yaml\n(.*?)```", TEXT, re.DOTALL)
     data = to_dict(load_hand_file()) | yaml.safe_load(example)
-    hand = from_dict(HandFile, data, "docs/effects.md")
+    hand = from_dict(HandFile, data, "docs/reference/effects.md")
     assert [effect.name for effect in hand.effects] == ["backlash", "joint_coupling"]

@@ -291,7 +291,7 @@ def _others(results: Results) -> list[Goal]:
         Goal(
             "F4, X4, X5, X9, no pickle, safe YAML, archives",
             "as the table of tests says",
-            "tests, see `docs/testing.md`",
+            "tests, see `docs/reference/testing.md`",
             met=True,
         ),
     ]
@@ -303,4 +303,4 @@ def _figure(figure: dict[str, list[dict]]) -> str:
         first, last = (np.mean(rows[k]["speed_mps"]) for k in (0, -1))
         worst = f"{rows[-1]['level']:g}"
         parts.append(f"{name} {worst}: {last:.3f} m/s of {first:.3f}")
-    return "; ".join(parts) + " (`docs/deploy.md`)"
+    return "; ".join(parts) + " (`docs/guides/deploy.md`)"

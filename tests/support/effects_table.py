@@ -1,4 +1,4 @@
-"""The table of `docs/effects.md`, from the catalogue.
+"""The table of `docs/reference/effects.md`, from the catalogue.
 
 `python tests/support/effects_table.py` prints it.
 """

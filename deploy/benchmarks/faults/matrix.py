@@ -35,15 +35,15 @@ LINK_HZ = 500.0  # packets per second on the way from the hand
 
 ELSEWHERE = """
 - **S14, the whole computer hangs:** the board's watchdog (at most 15 s, see
-  `docs/deploy.md`); it cannot be measured without the board. Nothing arms at boot.
+  `docs/guides/deploy.md`); it cannot be measured without the board. Nothing arms at boot.
 - **S16, another or a damaged policy:** refused before anything is opened, status 2 with
-  one sentence (10,000 damaged bundles in `docs/deploy-results.md`). A policy is read
+  one sentence (10,000 damaged bundles in `docs/results/deployment.md`). A policy is read
   once: what happens to its file later changes nothing (`deploy/tests/test_bundle.py`).
 - **S19, flapping, two at once, while settling:** rows S3 and S19 above; every state
   with every input, and random sequences, in `deploy/tests/safety/test_machine.py`.
 - **L7, jumps of the wall clock** by an hour, to 1970, back and forth: targets equal bit
   for bit (`deploy/tests/runtime/test_core.py`).
-- **L1 to L5, timing:** `docs/deploy-results.md`."""
+- **L1 to L5, timing:** `docs/results/deployment.md`."""
 
 
 def measure_scenario(starts: list[Lab], scenario: Scenario, trials: int, seed: int):
@@ -181,7 +181,7 @@ def as_markdown(results: dict) -> str:
     when = {part: sentence(each) for part, each in results["measured"].items()}
     parts = [
         "# Safety table",
-        "Written by `python deploy/benchmarks/faults/matrix.py`; see `docs/deploy.md` "
+        "Written by `python deploy/benchmarks/faults/matrix.py`; see `docs/guides/deploy.md` "
         "for what a software supervisor is not. Everything here is measured on a "
         "simulated hand, on a desktop processor, never yet on a real one.",
         "## Rules",

@@ -1,6 +1,6 @@
 """The diagnosis on public measurements, whose effects are known.
 
-FINGERS_REAL_DATA names the folder that has `emps` and the others; see docs/logs.md.
+FINGERS_REAL_DATA names the folder that has `emps` and the others; see docs/guides/logs.md.
 """
 
 import os
