@@ -1,6 +1,6 @@
 """The diagnosis finds what another simulator hides; a part of the battery, drawn anew.
 
-The whole battery is `make battery`; what it measured is in docs/guides/diagnose.md.
+The whole battery is `make battery`; what it measured is in docs/results/diagnosis.md.
 """
 
 import dataclasses
