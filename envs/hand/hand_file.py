@@ -8,7 +8,6 @@ this module is the calibrated hand of the paper. Fields ending in `pos`, `offset
 import dataclasses
 import hashlib
 import json
-import os
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -19,6 +18,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
+from envs.config.atomic_file import write_atomic
 from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError, one_of
 from envs.hand.figures import Figures, figures
@@ -187,13 +187,7 @@ def save_hand_file(hand: HandFile, path: str | Path) -> None:
 
     The file appears whole or not at all.
     """
-    target = Path(path)
-    part = target.with_name(f".{target.name}.{os.getpid()}")
-    try:
-        part.write_text(hand_yaml(hand), encoding="utf-8")
-        os.replace(part, target)
-    finally:
-        part.unlink(missing_ok=True)
+    write_atomic(Path(path), hand_yaml(hand))
 
 
 def _without_empty(data: Any) -> Any:

@@ -2,12 +2,12 @@
 
 import argparse
 
+from envs.config.atomic_file import write_atomic
 from envs.config.typed import load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import save_hand_file
 from fingers_mjx.cli.diagnose_walk import run_walk, walks
 from fingers_mjx.cli.excite import mechanism_of
-from fingers_mjx.evaluation.files import write_atomic
 from sysid.diagnosis.diagnose import examine
 from sysid.diagnosis.verdict.hand import extended_hand
 from sysid.logs.bag import BagMap
@@ -29,7 +29,7 @@ def run(args: argparse.Namespace) -> int:
     diagnosis, examined = examine(logs, mechanism, args.seed)
     args.out.mkdir(parents=True, exist_ok=True)
     text = diagnosis.to_json() + "\n"
-    write_atomic(args.out / "diagnosis.json", text.encode())
+    write_atomic(args.out / "diagnosis.json", text)
     if mechanism.hand is not None and diagnosis.causes:
         save_hand_file(extended_hand(mechanism.hand, diagnosis), args.out / "hand.yaml")
     if not args.no_report:

@@ -5,9 +5,9 @@ import dataclasses
 import sys
 from collections.abc import Sequence
 
+from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, save_hand_file
-from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.ppo.config import preset
 from fingers_mjx.runs.setup import Setup, make_env, new_setup
@@ -47,7 +47,7 @@ def run_walk(
     )
     args.out.mkdir(parents=True, exist_ok=True)
     text = diagnosis.to_json() + "\n"
-    write_atomic(args.out / "diagnosis.json", text.encode())
+    write_atomic(args.out / "diagnosis.json", text)
     if diagnosis.causes:
         save_hand_file(extended_hand(hand, diagnosis), args.out / "hand.yaml")
     print(f"{diagnosis.verdict}: {diagnosis.summary}")

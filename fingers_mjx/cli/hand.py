@@ -3,12 +3,12 @@
 import argparse
 from pathlib import Path
 
+from envs.config.atomic_file import write_atomic
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.hand.stance import settle, stance_json, stance_of
 from envs.hand.stance_search import search_stance
 from envs.hand.standing_mjcf import standing_mjcf
 from fingers_mjx.cli.paths import check_directory, check_file
-from fingers_mjx.evaluation.files import write_atomic
 
 
 def run(args: argparse.Namespace) -> int:
@@ -27,7 +27,7 @@ def run(args: argparse.Namespace) -> int:
 def _write(text: str, out: Path | None) -> int:
     if out:
         out.parent.mkdir(parents=True, exist_ok=True)
-        write_atomic(out, text.encode())
+        write_atomic(out, text)
     else:
         print(text, end="")
     return 0

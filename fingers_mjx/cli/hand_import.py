@@ -3,13 +3,13 @@
 import argparse
 from dataclasses import dataclass, field
 
+from envs.config.atomic_file import write_atomic
 from envs.config.typed import load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, hand_yaml
 from envs.hand.importing.figures import import_hand
 from envs.hand.stance import stance_of
 from fingers_mjx.cli.paths import check_file
-from fingers_mjx.evaluation.files import write_atomic
 
 _TURN = {"low": -1.0, "high": 1.0}
 
@@ -44,7 +44,7 @@ def run(args: argparse.Namespace) -> int:
         print(sentence)
     print(_standing(found.hand))
     args.out.parent.mkdir(parents=True, exist_ok=True)
-    write_atomic(args.out, hand_yaml(found.hand).encode())
+    write_atomic(args.out, hand_yaml(found.hand))
     print(f"wrote {args.out}")
     return 0
 

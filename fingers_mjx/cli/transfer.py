@@ -7,12 +7,12 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
 from envs.physics import default_backend
 from fingers_mjx.cli.paths import check_directory
 from fingers_mjx.cli.train import check_backend
-from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.policy.source import PolicySource, load_source
 from fingers_mjx.ppo.config import preset
 from fingers_mjx.runs.setup import Setup, new_setup, overridden
@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     document = compared(sources, found, args.seed, conditions)
     args.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2, allow_nan=False)
-    write_atomic(args.out / "transfer.json", text.encode())
+    write_atomic(args.out / "transfer.json", text)
     print("\n".join(_lines(document)))
     return 0
 

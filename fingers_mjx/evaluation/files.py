@@ -1,8 +1,6 @@
 """Files of an evaluation: per-episode Parquet table and JSON summary, each atomic."""
 
 import json
-import os
-import tempfile
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -11,25 +9,11 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
+from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_mjx.evaluation.stats import Summary, summarize
 
 SUMMARY_FILE, TABLE_FILE = "summary.json", "episodes.parquet"
-
-
-def write_atomic(path: Path, content: bytes) -> Path:
-    """Writes a whole file or leaves the old one: temporary file, sync, rename."""
-    handle, partial = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-    try:
-        with os.fdopen(handle, "wb") as stream:
-            stream.write(content)
-            stream.flush()
-            os.fsync(stream.fileno())
-        Path(partial).chmod(0o644)
-        Path(partial).replace(path)
-    finally:
-        Path(partial).unlink(missing_ok=True)
-    return path
 
 
 def write_table(
@@ -104,7 +88,7 @@ def summary_document(
 def write_summary(path: Path, document: Mapping[str, object]) -> Path:
     """Writes the summary as JSON, without the non-standard NaN and Infinity."""
     text = json.dumps(document, indent=2, allow_nan=False) + "\n"
-    return write_atomic(path, text.encode())
+    return write_atomic(path, text)
 
 
 def _plain(summary: Summary) -> dict[str, float | int | None]:

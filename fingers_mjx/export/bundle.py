@@ -1,13 +1,12 @@
 """Writing a policy bundle: `policy.onnx` and `manifest.json`, both or none."""
 
 import hashlib
-import os
-import tempfile
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 
+from envs.config.atomic_file import write_atomic_set
 from fingers_deploy.bundle import MANIFEST_FILE, POLICY_FILE, Bundle, decode_bundle
 from fingers_deploy.manifest import (
     SCHEMA_VERSION,
@@ -75,42 +74,10 @@ def write_bundle(directory: str | Path, bundle: Bundle) -> None:
     """
     directory = Path(directory)
     directory.mkdir(parents=True, exist_ok=True)
-    text = dump_manifest(bundle.manifest).encode("utf-8")
-    contents = {POLICY_FILE: bundle.model, MANIFEST_FILE: text}
-    waiting: dict[str, Path] = {}
-    try:
-        for name, data in contents.items():
-            waiting[name] = _write_aside(directory, data)
-        for name, path in waiting.items():
-            path.replace(directory / name)
-    finally:
-        for path in waiting.values():
-            path.unlink(missing_ok=True)
-    _sync(directory)
-
-
-def _write_aside(directory: Path, data: bytes) -> Path:
-    """Writes and syncs a temporary file in `directory`, or leaves none."""
-    handle, name = tempfile.mkstemp(prefix=".export-", dir=directory)
-    try:
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fchmod(file.fileno(), 0o644)
-            os.fsync(file.fileno())
-    except BaseException:
-        Path(name).unlink()
-        raise
-    return Path(name)
-
-
-def _sync(directory: Path) -> None:
-    """Makes the renames durable."""
-    handle = os.open(directory, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
+    text = dump_manifest(bundle.manifest)
+    write_atomic_set(
+        {directory / POLICY_FILE: bundle.model, directory / MANIFEST_FILE: text}
+    )
 
 
 def _rows(array: np.ndarray) -> tuple[tuple[float, ...], ...]:

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Any
 
 from envs.batch import BatchEnv
+from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
-from fingers_mjx.evaluation.files import SUMMARY_FILE, write_atomic
+from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.export.export import (
     Apply,
     ExportReport,

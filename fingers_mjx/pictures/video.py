@@ -2,7 +2,9 @@
 
 import io
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import closing
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -12,8 +14,8 @@ from jaxtyping import Float, UInt8
 from PIL import Image
 from scipy.ndimage import gaussian_filter1d
 
+from envs.config.atomic_file import atomic_path, write_atomic
 from envs.errors import InputError
-from fingers_mjx.evaluation.files import write_atomic
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.raycast import render
 from fingers_mjx.pictures.shade import Look
@@ -90,17 +92,12 @@ def write_mp4(path: Path, pictures: Iterable[Frame], fps: float, crf: int = 20) 
     first = next(stream, None)
     if first is None:
         raise InputError(path, "frames", "no frames", "at least one")
-    partial = path.with_name(f".{path.name}.partial.mp4")
-    writer = _mp4_writer(partial, _even(first), fps, crf)
-    try:
-        writer.send(_even(first).tobytes())
-        for picture in stream:
+    with (
+        atomic_path(path) as partial,
+        closing(_mp4_writer(partial, _even(first), fps, crf)) as writer,
+    ):
+        for picture in chain([first], stream):
             writer.send(_even(picture).tobytes())
-        writer.close()
-        partial.replace(path)
-    finally:
-        writer.close()
-        partial.unlink(missing_ok=True)
     return path
 
 

@@ -14,8 +14,8 @@ from typing import ClassVar
 import jinja2
 from matplotlib.figure import Figure
 
+from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.evaluation.files import write_atomic
 
 TEMPLATE = Path(__file__).with_name("report.html")
 PACKAGES = ("fingers-mjx", "jax", "mujoco", "mujoco-mjx", "brax", "numpy", "onnx")
@@ -102,7 +102,7 @@ def write_report(
     environment.filters["shown"] = shown
     environment.tests["number"] = is_number
     template = environment.from_string(TEMPLATE.read_text(encoding="utf-8"))
-    return write_atomic(path, template.render(title=title, sections=sections).encode())
+    return write_atomic(path, template.render(title=title, sections=sections))
 
 
 def picture(source: Figure | Path, caption: str = "") -> Picture:

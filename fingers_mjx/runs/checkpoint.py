@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 import orbax.checkpoint as ocp
 
+from envs.config.atomic_file import sync
 from envs.errors import InputError
 from fingers_mjx.runs import seal as manifest
 from fingers_mjx.runs.files import room_for
@@ -201,7 +202,7 @@ def _commit(tmp: Path, final: Path, reached: Callable[[str], None]) -> None:
     reached("name free")
     tmp.rename(final)
     reached("renamed")
-    manifest.sync(final.parent)
+    sync(final.parent)
     reached("committed")
 
 

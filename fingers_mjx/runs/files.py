@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from envs.config.atomic_file import write_atomic
 from fingers_mjx.training.errors import OutOfSpace
 
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
@@ -49,17 +50,8 @@ def write_whole(path: Path, content: bytes) -> None:
     Raises:
         OutOfSpace: if the disk is full; the old file is intact.
     """
-    tmp = path.with_name(f".{path.name}.tmp")
-    try:
-        with room_for(path, len(content)):
-            with tmp.open("wb") as file:
-                file.write(content)
-                file.flush()
-                os.fsync(file.fileno())
-            tmp.chmod(0o644)
-            tmp.replace(path)
-    finally:
-        tmp.unlink(missing_ok=True)
+    with room_for(path, len(content)):
+        write_atomic(path, content)
 
 
 def _free(directory: Path) -> int:

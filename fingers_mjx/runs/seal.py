@@ -2,10 +2,11 @@
 
 import hashlib
 import json
-import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+
+from envs.config.atomic_file import sync
 
 NAME = "manifest.json"
 
@@ -43,15 +44,6 @@ def problem(directory: Path, step: int) -> str:
         if _entry(directory / name) != entry:
             return f"{name} was altered"
     return ""
-
-
-def sync(path: Path) -> None:
-    """Forces a file or the entries of a directory to the disk."""
-    handle = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(handle)
-    finally:
-        os.close(handle)
 
 
 def _files(directory: Path) -> Iterator[Path]:

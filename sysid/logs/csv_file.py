@@ -12,12 +12,12 @@ An empty cell is a missing reading. The file beside `log.csv` is `log.yaml`.
 
 import csv
 import math
-import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
+from envs.config.atomic_file import atomic_path
 from envs.config.strict_yaml import parse_yaml
 from envs.config.typed import dump_yaml, from_dict, load_yaml
 from envs.errors import InputError
@@ -50,18 +50,16 @@ def write_csv(log: MeasuredLog, path: Path) -> None:
     """Writes a log that `read_csv` reads back exactly; it appears whole or not."""
     names = ["t", *log.columns, *(["key"] if log.key is not None else [])]
     arrays = [log.t_s, *log.columns.values()]
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
-        with open(part, "w", encoding="utf-8", newline="") as stream:
-            stream.writelines(f"# {x}\n" for x in dump_yaml(log.header).splitlines())
-            writer = csv.writer(stream)
-            writer.writerow(names)
-            for i, row in enumerate(zip(*arrays, strict=True)):
-                keys = [] if log.key is None else [log.key[i]]
-                writer.writerow([_text(x) for x in row] + keys)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
+    with (
+        atomic_path(path) as part,
+        open(part, "w", encoding="utf-8", newline="") as stream,
+    ):
+        stream.writelines(f"# {x}\n" for x in dump_yaml(log.header).splitlines())
+        writer = csv.writer(stream)
+        writer.writerow(names)
+        for i, row in enumerate(zip(*arrays, strict=True)):
+            keys = [] if log.key is None else [log.key[i]]
+            writer.writerow([_text(x) for x in row] + keys)
 
 
 def _text(value: float) -> str:

@@ -1,12 +1,12 @@
 """Measured logs as Parquet: one column each, the header in the schema's metadata."""
 
 import json
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from envs.config.atomic_file import atomic_path
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from sysid.logs.log import LogHeader, MeasuredLog
@@ -64,12 +64,8 @@ def write_parquet(log: MeasuredLog, path: Path) -> None:
     header = {**to_dict(log.header), "sha256": log.sha256}
     text = json.dumps(header, ensure_ascii=False).encode()
     table = pyarrow.table(columns).replace_schema_metadata({METADATA_KEY: text})
-    part = path.with_name(f".{path.name}.{os.getpid()}")
-    try:
+    with atomic_path(path) as part:
         pyarrow.parquet.write_table(table, part)
-        os.replace(part, path)
-    finally:
-        part.unlink(missing_ok=True)
 
 
 def _header(path: Path, metadata: dict[bytes, bytes]) -> tuple[LogHeader, str]:

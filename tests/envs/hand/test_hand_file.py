@@ -1,5 +1,6 @@
 import dataclasses
 import math
+import os
 import random
 
 import numpy as np
@@ -100,7 +101,7 @@ def test_interrupted_write_leaves_the_old_file(tmp_path, monkeypatch):
     def fail(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr(hand_file.os, "replace", fail)
+    monkeypatch.setattr(os, "replace", fail)
     with pytest.raises(OSError, match="disk full"):
         save_hand_file(dataclasses.replace(HAND, name="other"), path)
     assert load_hand_file(path) == HAND

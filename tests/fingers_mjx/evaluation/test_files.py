@@ -5,11 +5,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from envs.errors import InputError
-from fingers_mjx.evaluation import files as evaluate_files
 from fingers_mjx.evaluation.files import (
     read_table,
     summary_document,
-    write_atomic,
     write_summary,
     write_table,
 )
@@ -64,18 +62,3 @@ def test_summary_has_what_readers_rely_on(tmp_path):
     }
     assert measures["mean_contact_tilt_deg"] == undefined
     assert "commit" not in summary_document(COLUMNS, "crawl", "bundle", 3, 1_000)
-
-
-def test_a_failed_write_leaves_the_old_file(tmp_path, monkeypatch):
-    path = write_atomic(tmp_path / "a.json", b"old")
-
-    def full_disk(handle):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(evaluate_files.os, "fsync", full_disk)
-    with pytest.raises(OSError, match="No space"):
-        write_atomic(path, b"new")
-    assert path.read_bytes() == b"old"
-    assert list(tmp_path.iterdir()) == [path]
-    monkeypatch.undo()
-    assert write_atomic(path, b"new").read_bytes() == b"new"

@@ -3,6 +3,7 @@ import json
 import os
 import stat
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import onnx
@@ -18,7 +19,6 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.export import bundle as bundle_module
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
 
@@ -94,15 +94,15 @@ def test_same_input_same_bytes():
     assert _bundle().model == _bundle().model
 
 
-@pytest.mark.parametrize("step", ["fsync", "fchmod"])
+@pytest.mark.parametrize("step", ["fsync", "chmod"])
 def test_a_full_disk_leaves_the_old_bundle(tmp_path, monkeypatch, step):
     write_bundle(tmp_path, _bundle())
     old = {p.name: p.read_bytes() for p in tmp_path.iterdir()}
 
-    def full(*args):
+    def full(*_, **__):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(bundle_module.os, step, full)
+    monkeypatch.setattr(os, step, full)
     with pytest.raises(OSError, match="No space left"):
         write_bundle(tmp_path, _bundle(_weights(1)))
     assert {p.name: p.read_bytes() for p in tmp_path.iterdir()} == old
@@ -113,7 +113,7 @@ def test_a_crash_between_the_renames_is_never_a_mixed_bundle(
     tmp_path, monkeypatch, crash_at
 ):
     write_bundle(tmp_path, _bundle())
-    calls, plain = [], bundle_module.Path.replace
+    calls, plain = [], Path.replace
 
     def crash(self, target):
         calls.append(target)
@@ -121,7 +121,7 @@ def test_a_crash_between_the_renames_is_never_a_mixed_bundle(
             raise KeyboardInterrupt
         return plain(self, target)
 
-    monkeypatch.setattr(bundle_module.Path, "replace", crash)
+    monkeypatch.setattr(Path, "replace", crash)
     with pytest.raises(KeyboardInterrupt):
         write_bundle(tmp_path, _bundle(_weights(1)))
     monkeypatch.undo()

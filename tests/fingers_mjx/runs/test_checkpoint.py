@@ -115,7 +115,7 @@ def test_sudden_death_leaves_the_newest_complete_checkpoint(tmp_path, point):
 def test_kill_at_any_point_leaves_the_newest_complete_checkpoint(tmp_path, repeats):
     """The same with real processes and SIGKILL, also in the middle of writing."""
     script = Path(checkpoint_child.__file__)
-    root = script.parents[1]
+    root = script.parents[2]
     paths = os.pathsep.join([str(root), str(root / "deploy")])
     subprocess.run(
         [sys.executable, str(script), str(tmp_path), str(repeats)],

@@ -1,6 +1,7 @@
 """Run directory: one writer, never over something else, curves without a seam."""
 
 import json
+import os
 import struct
 from dataclasses import dataclass
 
@@ -9,7 +10,6 @@ from tensorboardX.proto.event_pb2 import Event
 
 from envs.errors import InputError
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.runs import files as rundir_files
 from fingers_mjx.runs.directory import check_bound, open_run, record_run, saved_config
 from fingers_mjx.runs.files import write_whole
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
@@ -166,7 +166,7 @@ def test_full_disk_keeps_the_old_file(tmp_path, monkeypatch):
     def full(number):
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(rundir_files.os, "fsync", full)
+    monkeypatch.setattr(os, "fsync", full)
     with pytest.raises(OutOfSpace, match="needs 3 bytes"):
         write_whole(path, b"new")
     assert path.read_bytes() == b"old"
