@@ -3,8 +3,7 @@
     python deploy/benchmarks/loop_timing.py --minutes 10 --load 2 [--no-realtime]
 
 `--load` starts that many busy processes; they end with the measurement. The policy is
-the committed one; the hand walks all the time, and is armed again after a stop. Steps
-that were missed while the host had put the whole machine aside are told apart.
+the committed one; the hand walks all the time, and is armed again after a stop.
 """
 
 import argparse
@@ -20,18 +19,15 @@ from pathlib import Path
 import numpy as np
 from faults.processes import NEXT, plain_options
 from hand_files import WALKING, write_model
-from witness import Pauses, witnesses
 
 from fingers_deploy.bundle import load_bundle
 from fingers_robot.drivers.sim import SimulatorProcess
 from fingers_robot.record import read_log
 from fingers_robot.runtime.launcher import Launcher
 from fingers_robot.runtime.realtime import resident_mb
-from fingers_robot.runtime.stats import LATE_S
 from fingers_robot.safety import Mode
 
-SAMPLE_S, CONTROL_S = 10.0, 0.02
-REACTION_S = 0.3  # a stop comes so long after the pause that it answers
+SAMPLE_S = 10.0
 
 
 def _busy() -> None:
@@ -102,14 +98,13 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         launcher = Launcher(options, lines.append)
         memory = Memory(launcher)
         begin, before = time.monotonic(), processor_s()
-        with witnesses() as pauses:
-            operate(launcher, seconds, memory.sample)
+        operate(launcher, seconds, memory.sample)
         took, after = time.monotonic() - begin, processor_s()
         if took < seconds:
             raise SystemExit("\n".join(["the run ended early", *lines[-9:]]))
         files = sorted(Path(out).glob("*.mcap"))
         largest = max(file.stat().st_size for file in files)
-        recorded = [_recorded(file, pauses) for file in files]
+        recorded = [_recorded(file) for file in files]
     status, timing = launcher.status, launcher.status["timing"]
     missed = timing["late_over_5ms"] + timing["skipped"]
     asked = timing["control_steps"] + timing["skipped"]
@@ -120,11 +115,6 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         "scheduler": status["realtime"],
         "missed_percent": round(100 * missed / asked, 4),
         "missed": missed,
-        "of_these_in_a_pause": sum(row["in_a_pause"] for row in recorded),
-        "pauses": len(pauses.found),
-        "longest_pause_ms": round(
-            1e3 * max((b - a for a, b in pauses.found), default=0.0), 1
-        ),
         "late_percent_of_gaps": round(
             100 * timing["gaps_over_4ms"] / timing["loop_steps"], 4
         ),
@@ -135,39 +125,23 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         "steps_with_policy": sum(row["walked"] for row in recorded),
         "worst_skipped_in_a_row": max(row["in_a_row"] for row in recorded),
         "stops": sum(row["stops"] for row in recorded),
-        "stops_after_a_pause": sum(row["stops_in_a_pause"] for row in recorded),
         "why": sorted({line.split(":")[0] for line in lines if " -> hold" in line}),
         "warned": any(line.startswith("NOT ON TIME") for line in lines),
     }
 
 
-def _recorded(file: Path, pauses: Pauses) -> dict[str, int]:
-    """Counts of one file: steps, misses and the supervisor's stops, also in pauses."""
+def _recorded(file: Path) -> dict[str, int]:
+    """Counts of one file: steps with the policy, misses, the supervisor's stops."""
     log = read_log(file)
-    rows, start = log.rows, float(log.metadata["start_unix_s"])
-    walked = int((rows["mode"] == Mode.ACTIVE).sum())
+    rows = log.rows
     total = rows["skipped"].astype(np.int64)
     skipped = np.diff(total, prepend=total[:1])
-    late = rows["late_s"] > LATE_S
-    excused = 0
-    for k in np.flatnonzero(late | (skipped > 0)):
-        t = float(rows["unix_s"][k])
-        begin = t - float(rows["late_s"][k]) - CONTROL_S * int(skipped[k])
-        if pauses.during(begin, t):
-            excused += int(late[k]) + int(skipped[k])
-    worst = int(skipped.max()) if len(skipped) else 0
     asked = {t for t, line in log.events if line.startswith("OP ")}
-    stops = [
-        start + t
-        for t, line in log.events
-        if line.startswith("active -> ") and t not in asked
-    ]
+    ends = [t for t, line in log.events if line.startswith("active -> ")]
     return {
-        "walked": walked,
-        "in_a_row": worst,
-        "in_a_pause": excused,
-        "stops": len(stops),
-        "stops_in_a_pause": sum(pauses.during(t - REACTION_S, t) for t in stops),
+        "walked": int((rows["mode"] == Mode.ACTIVE).sum()),
+        "in_a_row": int(skipped.max()) if len(skipped) else 0,
+        "stops": sum(t not in asked for t in ends),
     }
 
 

@@ -1,10 +1,10 @@
 """Walking quality against disturbances between hand and policy, as one figure.
 
-    python deploy/benchmarks/walking_quality.py --out OUT
+    python deploy/benchmarks/walking_quality.py --out FIGURE.png
 
-writes `<out>.png` and `<out>.json` for the committed policy. Quality is that of the
-policy with the supervisor's limits on age and freezing off; where the supervisor as it
-is stops the hand, the point is marked.
+draws it for the committed policy and prints the numbers. Quality is that of the policy
+with the supervisor's limits on age and freezing off; where the supervisor as it is
+stops the hand, the point is marked.
 """
 
 import argparse
@@ -120,7 +120,7 @@ def measure(start: Lab, seconds: float, trials: int) -> dict:
                     "why": sorted({w for d in done for w in d["why"]}),
                 }
             )
-            print(name, rows[-1], file=sys.stderr)
+            print(name, json.dumps(rows[-1]), flush=True)
         results[name] = rows
     return results
 
@@ -152,7 +152,7 @@ def draw(results: dict, path: Path) -> None:
 
 
 def main() -> int:
-    """Runs the measurement and writes figure and numbers."""
+    """Runs the measurement, prints the numbers and draws the figure."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--bundle", type=Path, default=WALKING)
     parser.add_argument("--seconds", type=float, default=10.0)
@@ -164,8 +164,7 @@ def main() -> int:
         model = write_model(Path(folder) / "hand.xml")
         lab = Lab(model, (bundle,), sticks=(1.0, 0.0, 0.0), loop_hz=500)
         results = measure(lab.activate().run(2.0), options.seconds, options.trials)
-    options.out.with_suffix(".json").write_text(json.dumps(results, indent=1) + "\n")
-    draw(results, options.out.with_suffix(".png"))
+    draw(results, options.out)
     return 0
 
 
