@@ -1,6 +1,7 @@
 """One substep of a position-controlled joint with any tuple of effects."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import jax.numpy as jnp
@@ -14,16 +15,41 @@ Model = Sequence[tuple[EffectKind, Params]]
 """Effects with their parameters; those of one stage act in this order."""
 
 
+@dataclass(frozen=True)
+class JointInput:
+    """What a joint starts a substep from; without gains only the command path counts.
+
+    Attributes:
+        target: target of this substep [rad].
+        q, qd: joint angle [rad] and speed [rad/s].
+        load: torque of everything but the drive on the joint [N·m].
+        kp, kd: nominal gains of the servo [N·m/rad], [N·m·s/rad].
+        around: what the rest of the hand does, for effects that need it.
+    """
+
+    target: Float[Array, "*#j"]
+    q: Float[Array, "*j"]
+    qd: Float[Array, "*j"]
+    load: Float[ArrayLike, "*#j"] = 0.0
+    kp: Float[ArrayLike, "*#j"] = 1.0
+    kd: Float[ArrayLike, "*#j"] = 0.0
+    around: Surroundings = ALONE
+
+
 def init_states(
-    model: Model, target: Float[Array, "*j"], q: Float[Array, "*j"], dt: float
+    model: Model, target: Float[Array, "*#j"], q: Float[Array, "*j"], dt: float
 ) -> tuple[Any, ...]:
-    """Returns the states of all effects at rest: nothing has changed for long.
+    """States of all effects at rest, in which no signal changes: ẋ = 0.
 
     Args:
         model: effects with their parameters.
-        target: target that was sent [rad].
+        target: target that has been sent since t = −∞ [rad].
         q: angle at which the joint rests [rad].
-        dt: substep [s].
+        dt: substep [s], > 0.
+
+    Source:
+        Ours: an episode and a record start at rest, so that no filter is filled by
+        a transient.
     """
     return tuple(kind.init(params, target, q, dt) for kind, params in model)
 
@@ -31,50 +57,49 @@ def init_states(
 def chain_step(
     model: Model,
     states: tuple[Any, ...],
-    target: Float[Array, "*j"],
-    q: Float[Array, "*j"],
-    qd: Float[Array, "*j"],
-    load: Float[ArrayLike, "*j"],
-    kp: Float[ArrayLike, "*j"],
-    kd: Float[ArrayLike, "*j"],
+    joint: JointInput,
     dt: float,
-    around: Surroundings = ALONE,
 ) -> tuple[tuple[Any, ...], Substep]:
     """Runs one substep: target → command → servo → transmission → friction → reading.
 
         e = c − y,   τ = kp e − kd ẏ
 
-    with command c and encoder y; effects change the signals where they act. Without
-    effects this is the plain servo.
+    with command c [rad] and encoder y [rad]; effects change the signals where they
+    act. Without effects this is the plain servo.
 
     Args:
         model: effects with their parameters.
         states: their states after the previous substep.
-        target: target of this substep [rad].
-        q: joint angle [rad].
-        qd: joint speed [rad/s].
-        load: torque of everything but the drive on the joint [N·m].
-        kp: nominal position gain [N·m/rad].
-        kd: nominal velocity gain [N·m·s/rad].
-        dt: substep [s].
-        around: what the rest of the hand does, for effects that need it.
+        joint: target, motion, load and gains.
+        dt: substep [s], > 0.
 
     Returns:
         The new states, and the signals: torques, friction, damping and inertia go to
-        the physics (see `effects.joint`), effort and reading to the observer.
+        the physics (see `joint_step`), effort and reading to the observer.
 
     Raises:
         InputError: an effect needs surroundings that are not given.
     """
-    _check_surroundings(model, around)
-    kp, kd, load = (jnp.broadcast_to(x, jnp.shape(q)) for x in (kp, kd, load))
-    none = jnp.zeros_like(q)
-    x = Substep(
-        command=target,
-        q=q,
-        qd=qd,
-        encoder=q,
-        encoder_speed=qd,
+    _check_surroundings(model, joint.around)
+    x = _signals(joint)
+    for stage in Stage:
+        x = _servo(stage, x)
+        states, x = _act(model, states, stage, x, dt)
+    return states, x
+
+
+def _signals(joint: JointInput) -> Substep:
+    """The signals before any stage; what a stage computes is zero until then."""
+    shape = jnp.shape(joint.q)
+    given = (joint.kp, joint.kd, joint.load)
+    kp, kd, load = (jnp.broadcast_to(x, shape) for x in given)
+    none = jnp.zeros_like(joint.q)
+    return Substep(
+        command=joint.target,
+        q=joint.q,
+        qd=joint.qd,
+        encoder=joint.q,
+        encoder_speed=joint.qd,
         error=none,
         kp=kp,
         kd=kd,
@@ -88,12 +113,8 @@ def chain_step(
         viscous=none,
         inertia=none,
         reading=none,
-        around=around,
+        around=joint.around,
     )
-    for stage in Stage:
-        x = _servo(stage, x)
-        states, x = _act(model, states, stage, x, dt)
-    return states, x
 
 
 def _servo(stage: Stage, x: Substep) -> Substep:

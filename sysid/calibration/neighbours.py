@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.quiet_mujoco import mujoco
 from sysid.excitation.plan import joint_address
 from sysid.mechanism import JointDrive, Mechanism
@@ -137,7 +137,7 @@ def _command(
     none, first = jnp.zeros(()), float(held[0])
 
     def step(states, target):
-        states, x = chain_step(model, states, target, none, none, 0.0, 1.0, 0.0, dt)
+        states, x = chain_step(model, states, JointInput(target, none, none), dt)
         return states, x.command
 
     # Float32 holds 0.1 µrad of a deviation, and none of a multiple of π.

@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.calibration.record import BLOCK_S, STEP_S, Record
 from sysid.search_fit import Search
@@ -137,7 +137,8 @@ def _simulate(thetas, inputs, figures, held_by):
             target, load, slope, about, inertia, moved, left, inverse, command = now
             push = held_by[0] * (command - others) - held_by[1] * speeds
             load = weight * (load + slope * (q - about)) - moved @ push
-            states, x = chain_step(model, states, target, q, v, load, *gains, STEP_S)
+            joint = JointInput(target, q, v, load, *gains)
+            states, x = chain_step(model, states, joint, STEP_S)
             # Speeds stand between the angles: half the implicit damping takes the
             # drive's at the angle, which is right to second order in the step.
             half = 0.5 * x.damping

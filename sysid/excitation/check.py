@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import effect_kind
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.errors import InputError
 from envs.quiet_mujoco import mujoco
 from sysid.excitation.plan import Limits, Plan, joint_address, joint_range, make_plan
@@ -140,7 +140,7 @@ def _path(names, values, held):
     zero = jnp.zeros(())
 
     def step(states, target):
-        out = chain_step(model, states, target, zero, zero, 0.0, 1.0, 0.0, STEP_S)
+        out = chain_step(model, states, JointInput(target, zero, zero), STEP_S)
         return out[0], out[1].command
 
     start = init_states(model, held[0], zero, STEP_S)

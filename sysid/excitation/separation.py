@@ -23,7 +23,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import EffectKind
 from envs.actuator.joint import joint_step
 from envs.actuator.surroundings import Surroundings
@@ -277,8 +277,8 @@ def _run(names, repeat, stacked, rows, figures):
             states, q, v, _ = carry
             target, load, stiffness, around = now
             load = load + stiffness * (q - target)
-            args = (target, q, v, load, kp, kd, STEP_S, around)
-            states, x = chain_step(model, states, *args)
+            joint = JointInput(target, q, v, load, kp, kd, around)
+            states, x = chain_step(model, states, joint, STEP_S)
             q, v = joint_step(x, inertia, STEP_S)
             return states, q, v, jnp.stack([x.reading, x.effort])
 

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from envs.actuator.surroundings import ALONE, Gravity, Surroundings
 
@@ -58,9 +58,8 @@ def _run(names, params, target, load, q0, v0, kp, kd, dt, around):
 
     def step(carry, inputs):
         states, q, v = carry
-        states, x = chain_step(
-            model, states, inputs[0], q, v, inputs[1], kp, kd, dt, around
-        )
+        joint = JointInput(inputs[0], q, v, inputs[1], kp, kd, around)
+        states, x = chain_step(model, states, joint, dt)
         q, v = joint_step(x, INERTIA, dt)
         return (states, q, v), (q, v, x.replace(around=ALONE))
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import EffectKind, Params, Substep
 from envs.actuator.surroundings import Surroundings
 from envs.hand.effect_parts import load_sensor
@@ -125,7 +125,8 @@ def begin_chain(
     states = init_states(links, target, q, chain.dt)
     rest = ChainState(effects=states, reading=q, effort=none, load=none)
     around = _around(chain, rest, q)
-    x = chain_step(links, states, target, q, none, 0.0, 1.0, 0.0, chain.dt, around)[1]
+    joint = JointInput(target, q, none, around=around)
+    x = chain_step(links, states, joint, chain.dt)[1]
     return rest.replace(reading=x.reading)
 
 
@@ -156,9 +157,8 @@ def chain_substep(
     rotor = jnp.asarray(nominal.dof_armature[JOINT_QVEL], jnp.float32)
     around = _around(chain, drive, q).replace(inertia=rotor)
     kp, kd = gain[:, 0], -bias[:, 2]
-    states, x = chain_step(
-        links, drive.effects, target, q, qd, drive.load, kp, kd, chain.dt, around
-    )
+    joint = JointInput(target, q, qd, drive.load, kp, kd, around)
+    states, x = chain_step(links, drive.effects, joint, chain.dt)
     drive = drive.replace(effects=states, reading=x.reading, effort=x.effort)
     return drive, fields | _applied(fields, nominal, x)
 

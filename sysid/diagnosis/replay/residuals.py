@@ -25,7 +25,7 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import EffectKind, Stage
 from envs.actuator.surroundings import Gravity, Surroundings
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
@@ -277,9 +277,8 @@ def forced_residuals(
             ),
         )
         kp, kd = track.kp[:, None], track.kd[:, None]
-        states, x = chain_step(
-            model(now, ripple, ahead), states, target, q, qd, load, kp, kd, dt, around
-        )
+        joint = JointInput(target, q, qd, load, kp, kd, around)
+        states, x = chain_step(model(now, ripple, ahead), states, joint, dt)
         inertia = mass * now["inertia"] + x.inertia
         share = jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0)
         loud, usual = _loudness(track, now, x, share, gain, inertia / steep)

@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from envs.actuator.surroundings import Gravity, Surroundings
 from sysid.diagnosis.replay.command import command_path
@@ -95,7 +95,8 @@ def _closed_loop(
                 payload_inertia=now["payload_inertia"],
             ),
         )
-        states, x = chain_step(model, states, target, q, qd, load, kp, kd, dt, around)
+        joint = JointInput(target, q, qd, load, kp, kd, around)
+        states, x = chain_step(model, states, joint, dt)
         q, qd = joint_step(x, mass * now["inertia"], dt)
         return states, q, qd, x.encoder
 

@@ -17,7 +17,7 @@ from benchmarks.diagnosis.hidden.sampling import Noise, exact, record
 from benchmarks.diagnosis.hidden.simulate import simulate
 from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step
+from envs.actuator.chain import JointInput, chain_step
 
 FOLDER = Path(hidden.__file__).parent
 WEIGHT = Link(
@@ -141,7 +141,8 @@ def test_directions_have_the_sign_of_the_catalogue(difference, speed):
             force = drive.resist(0.0, speed, 0.0)
         model = [(CATALOGUE[effect], {k: jnp.asarray(v) for k, v in known.items()})]
         qd, none = jnp.asarray(speed), jnp.asarray(0.0)
-        x = chain_step(model, ((),), none, none, qd, none, KP, KD, 5e-4)[1]
+        joint = JointInput(none, none, qd, none, KP, KD)
+        x = chain_step(model, ((),), joint, 5e-4)[1]
         resists = -x.viscous * speed - x.friction * np.sign(speed)
         assert force == pytest.approx(float(resists), abs=1e-4)
         assert (abs(force) > 0.01) == (difference * speed > 0.0)

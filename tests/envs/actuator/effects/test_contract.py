@@ -11,7 +11,7 @@ from support import effects_rig as rig
 
 import envs.actuator.effects
 from envs.actuator.catalogue import CATALOGUE, effect_kind
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import Stage, Substep
 from envs.actuator.joint import joint_step
 from envs.actuator.surroundings import ALONE
@@ -169,9 +169,8 @@ def test_gradients_are_finite(name):
         states = init_states(model, q, q, rig.DT)
         around = jax.tree.map(jnp.asarray, rig.AROUND)
         for target in (0.1, 0.3):
-            states, x = chain_step(
-                model, states, jnp.asarray(target), q, v, LOAD, 2, 0.05, rig.DT, around
-            )
+            joint = JointInput(jnp.asarray(target), q, v, LOAD, 2.0, 0.05, around)
+            states, x = chain_step(model, states, joint, rig.DT)
             q, v = joint_step(x, jnp.asarray(rig.INERTIA), rig.DT)
         return sum(jnp.sum(leaf) for leaf in jax.tree.leaves((q, v, x)))
 
@@ -210,7 +209,7 @@ def test_negative_friction_would_be_seen():
 def test_signals_are_all_set():
     """The chain hands the physics one number per joint in every signal."""
     zero = jnp.zeros(3)
-    _, x = chain_step((), (), zero, zero, zero, 0.0, 1.0, 0.0, rig.DT)
+    _, x = chain_step((), (), JointInput(zero, zero, zero), rig.DT)
     assert isinstance(x, Substep)
     signals = {k: v for k, v in vars(x).items() if k != "around"}
     assert {leaf.shape for leaf in jax.tree.leaves(signals)} == {(3,)}

@@ -7,7 +7,7 @@ import pytest
 from support import effects_rig as rig
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import chain_step, init_states
+from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import lognormal, normal
 from envs.hand.drive.servo import MAX_DELAY_S, DriveParams, drive_step, init_drive_state
 
@@ -283,7 +283,8 @@ def both_chains(effects, params, dt=0.005):
     def step(states, row):
         ours, theirs = states
         target, q, qd = row
-        ours, x = chain_step(model, ours, target, q, qd, 0.0, 2.0, 0.2, dt)
+        joint = JointInput(target, q, qd, 0.0, 2.0, 0.2)
+        ours, x = chain_step(model, ours, joint, dt)
         theirs, _, torque = drive_step(params, theirs, target, q, qd, dt)
         return (ours, theirs), (x.torque, torque)
 

@@ -179,7 +179,7 @@ def test_mutual_coupling_is_a_spring_between_two_joints():
     import jax.numpy as jnp
 
     from envs.actuator.catalogue import CATALOGUE
-    from envs.actuator.chain import chain_step, init_states
+    from envs.actuator.chain import JointInput, chain_step, init_states
     from envs.actuator.joint import joint_step
     from envs.actuator.surroundings import Surroundings
 
@@ -191,7 +191,8 @@ def test_mutual_coupling_is_a_spring_between_two_joints():
         def step(carry, _):
             q, v = carry
             around = Surroundings(other_q=q[::-1], other_nm=zero)
-            _, x = chain_step(model, ((),), zero, q, v, 0.0, 0.0, 0.0, 1e-4, around)
+            joint = JointInput(zero, q, v, 0.0, 0.0, 0.0, around)
+            _, x = chain_step(model, ((),), joint, 1e-4)
             x = x.replace(load=-2.0 * q)  # a spring of each joint's own
             q, v = joint_step(x, rig.INERTIA, 1e-4)
             potential = jnp.sum(q**2) - stiffness[0] * q[0] * q[1]
