@@ -26,9 +26,9 @@ from scipy.signal import lfilter
 
 from sysid.calibration.record import joint_record
 from sysid.calibration.simulation import Motion
+from sysid.least_squares import Task, fit_all
 from sysid.logs.log import MeasuredLog, make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism
-from sysid.search_fit import Search
 
 RATE_HZ, STEP_S, FINE_S = 500.0, 0.001, 0.000125
 CUTOFF_HZ = 20.0
@@ -98,18 +98,13 @@ def ours(log: MeasuredLog) -> np.ndarray:
     motion = Motion([record], (NOMINAL[0], NOMINAL[1]), 1e6)
     motion.scales = [np.array([NOISE["pos"], NOISE["tau"]])]
     # Neither delay nor speed limit, nor friction.
-    path = np.log([1e-9, CUTOFF_HZ, 1e6])
-    fixed = np.concatenate([[0.0, 0.0], path, np.zeros(4)])
-    free = [0, 1, 5]
-
-    def residuals(thetas: np.ndarray) -> np.ndarray:
-        whole = np.tile(fixed, (len(thetas), 1))
-        whole[:, free] = thetas
-        return motion.residuals(whole)
-
-    wide = np.full(3, 10.0)
-    search = Search(residuals, np.zeros(3), wide, -wide, wide)
-    found = np.exp(search.solved(np.zeros(3)))
+    start = np.concatenate([[0.0, 0.0], np.log([1e-9, CUTOFF_HZ, 1e6]), np.zeros(4)])
+    wide, steps = np.full(9, 10.0), np.full(9, 0.01)
+    task = Task(
+        start, np.array([0, 1, 5]), start, wide, start - wide, start + wide, steps
+    )
+    fit = fit_all(motion.residuals, [task], rounds=30)[0]
+    found = np.exp(fit.theta[fit.free])
     inertia = float(np.mean(record.neighbours.inertia))
     rest = inertia - NOMINAL[2]
     return np.append(NOMINAL[:2] * found[:2], found[2] * inertia - rest)

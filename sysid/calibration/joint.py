@@ -7,7 +7,7 @@ along, so that they bend nothing.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -15,6 +15,7 @@ from jaxtyping import Float
 from envs.errors import InputError
 from sysid.calibration.record import Record, joint_record
 from sysid.calibration.simulation import SERVO, Motion
+from sysid.least_squares import Task, fit_all, standard_errors
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
 
@@ -27,8 +28,12 @@ FIGURES: tuple[str, ...] = (
 )
 """What is reported; inertia, weight and both frictions are fitted along."""
 
-_DEVIATION = np.array([2.0, 2.0, 1.5, 1.5, 2.0])
-"""Of the priors of the logarithms."""
+_DEVIATION = np.array([2.0, 2.0, 1.5, 1.5, 2.0, 0.05, 0.05, 1.0, 1.0])
+"""Of the priors: of logarithms, and of the frictions in units of the largest torque and
+of the velocity gain."""
+
+_LONGEST_DELAY_S = 0.095
+_ROUNDS, _STEP = 30, 0.01
 
 _FLOOR = np.array([0.012, 0.012, 0.012, 0.003, 0.0015])
 """Deviations of the logarithms below which nothing is believed: nobody knows when
@@ -77,7 +82,8 @@ def fit_joint(
         valid = "targets that move the joint"
         raise InputError(logs[0].source, f"cmd.{joint}", "no motion", valid)
     drive = mechanism.drives[joint]
-    motion = Motion(records, *_gains_and_limit(drive))
+    limit = drive.figure("torque_limit", "limit_nm", _NO_TORQUE_LIMIT)
+    motion = Motion(records, (drive.kp.value, drive.kd.value), limit)
     theta, half = _solved(motion, _nominal(drive))
     servo = theta[SERVO]
     simulated = tuple(y[0] for y in motion.simulate(theta[None]))
@@ -89,28 +95,32 @@ def fit_joint(
     return JointFit(joint, values, low, high, rms, records, simulated)
 
 
-def _gains_and_limit(drive: JointDrive) -> tuple[tuple[float, float], float]:
-    """Nominal gains and torque limit."""
-    limit = drive.effects.get("torque_limit", {}).get("limit_nm")
-    gains = (drive.kp.value, drive.kd.value)
-    return gains, limit.value if limit else _NO_TORQUE_LIMIT
-
-
 def _solved(
-    motion: Motion, nominal: Float[np.ndarray, " 5"]
-) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " 5"]]:
+    motion: Motion, nominal: Float[np.ndarray, " 9"]
+) -> tuple[Float[np.ndarray, " 9"], Float[np.ndarray, " 5"]]:
     """All parameters, and half the widths of the servo's intervals."""
-    search = motion.search(nominal, _DEVIATION)
-    starts = _starts(search.center)
-    near = starts[np.isclose(starts[:, 0], search.center[0])]
+    starts = _starts(nominal)
+    costs = np.sum(np.clip(motion.residuals(starts), -30.0, 30.0) ** 2, 1)
     # A gain far off may start better and end worse.
-    theta = search.best_solved([search.best_of(starts), search.best_of(near)])
+    near = np.where(starts[:, 0] == nominal[0], costs, np.inf)
+    chosen = {int(np.argmin(costs)), int(np.argmin(near))}
+    tasks = [_task(starts[i], nominal) for i in chosen]
+    fit = min(fit_all(motion.residuals, tasks, _ROUNDS), key=lambda fit: fit.cost)
     for _ in range(2):
         # Once more with channels weighed by what they really scatter.
-        motion.weigh(motion.residuals(theta[None])[0])
-        theta = search.solved(theta)
-    spread, wide = search.spread(theta, motion.blocks())
-    return theta, wide * np.hypot(spread[SERVO], _FLOOR)
+        motion.weigh(motion.residuals(fit.theta[None])[0])
+        task = replace(tasks[0], start=fit.theta)
+        fit = fit_all(motion.residuals, [task], _ROUNDS)[0]
+    errors, wide = standard_errors(fit, _DEVIATION, motion.blocks())
+    return fit.theta, wide * np.hypot(errors[SERVO], _FLOOR)
+
+
+def _task(start: Float[np.ndarray, " 9"], nominal: Float[np.ndarray, " 9"]) -> Task:
+    """The fit of all parameters from a start, with priors around the nominal ones."""
+    low, high = np.full(9, -np.inf), np.full(9, np.inf)
+    high[2], low[7:] = np.log(_LONGEST_DELAY_S), 0.0
+    steps = np.full(9, _STEP)
+    return Task(start, np.arange(9), nominal, _DEVIATION, low, high, steps)
 
 
 def _starts(center: Float[np.ndarray, " n"]) -> Float[np.ndarray, "c n"]:
@@ -125,17 +135,12 @@ def _starts(center: Float[np.ndarray, " n"]) -> Float[np.ndarray, "c n"]:
     return np.array(grid)
 
 
-def _nominal(drive: JointDrive) -> Float[np.ndarray, " 5"]:
+def _nominal(drive: JointDrive) -> Float[np.ndarray, " 9"]:
     """Parameters of the drive as simulated so far."""
-
-    def figure(effect: str, name: str, default: float) -> float:
-        found = drive.effects.get(effect, {}).get(name)
-        return found.value if found else default
-
-    delay = max(figure("transport_delay", "delay_s", 0.01), 1e-3)
-    cutoff = figure("lowpass_cutoff", "cutoff_hz", 20.0)
-    speed = figure("slew_limit", "speed_rad_s", _NO_SPEED_LIMIT)
-    return np.array([0.0, 0.0, np.log(delay), np.log(cutoff), np.log(speed)])
+    delay = max(drive.figure("transport_delay", "delay_s", 0.01), 1e-3)
+    cutoff = drive.figure("lowpass_cutoff", "cutoff_hz", 20.0)
+    speed = drive.figure("slew_limit", "speed_rad_s", _NO_SPEED_LIMIT)
+    return np.concatenate([[0.0, 0.0], np.log([delay, cutoff, speed]), np.zeros(4)])
 
 
 def _rms(records: Sequence[Record], simulated: Sequence[np.ndarray]):

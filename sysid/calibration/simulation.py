@@ -17,14 +17,9 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.calibration.record import BLOCK_S, STEP_S, Record
-from sysid.search_fit import Search
 
 SERVO = slice(0, 5)
 """Parameters of the servo; after them inertia, weight, dry and viscous friction."""
-
-BODY_DEVIATION = np.array([0.05, 0.05, 1.0, 1.0])
-"""Of the priors of the rest: of logarithms, of frictions in units of the largest torque
-and of the velocity gain."""
 
 # The delay comes last: it may, for the path is the same at all times, and between two
 # steps a smooth command can be read where a jump cannot (a speed limit would take a
@@ -88,20 +83,6 @@ class Motion:
             count = np.maximum(r.valid.sum(0), 1)
             factor = np.sqrt(np.sum(rest**2, 0) / count)
             self.scales[i] = self.scales[i] * np.maximum(factor, 1e-6)
-
-    def search(
-        self, center: Float[np.ndarray, " 5"], deviation: Float[np.ndarray, " 5"]
-    ) -> Search:
-        """The least-squares problem with priors of the servo's parameters."""
-        low, high = np.full(9, -np.inf), np.full(9, np.inf)
-        high[2], low[7:] = np.log(0.095), 0.0
-        return Search(
-            self.residuals,
-            np.append(center, np.zeros(4)),
-            np.append(deviation, BODY_DEVIATION),
-            low,
-            high,
-        )
 
     def blocks(self) -> Int[np.ndarray, " n"]:
         """Number of the block of every residual."""

@@ -12,39 +12,52 @@ friction of the fingertips is fitted along in all of them.
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from envs.actuator.effects.mount_tilt import tilted
 from envs.batch import BatchEnv
+from sysid.least_squares import (
+    Fit,
+    Task,
+    fit_all,
+    gauss_newton,
+    standard_errors,
+)
 from sysid.logs.log import MeasuredLog
 from sysid.result import Diagnosis
-from sysid.search_fit import Search
 from sysid.walking.hypotheses import Hypothesis, axes, candidate, hypotheses
 from sysid.walking.record import walk_record
-from sysid.walking.simulation import LOOKS, PIECE_STEPS, Pieces
+from sysid.walking.simulation import PIECE_STEPS, Pieces
 from sysid.walking.verdict import BOUND, Judged, verdict_of
 
 STRETCH_S = 5.0
 FULL = 3
 """Hypotheses that are fitted in full."""
 
-_PRIOR, _TANGENT, _ROBUST = 10.0, 1.0, 3.0
+_PRIOR, _STEP, _ROBUST = 10.0, 1.0, 3.0
+_ROUNDS = 16
 
 _FLOOR = 0.3
 """Deviation of parameters, in units of their axes, below which nothing is
 believed: short walks start from measured states, whose noise and smoothing bend what
 they show (found on walks with known causes)."""
 
-_TOLD = "floor_tilt"
-"""Effect that IMU and camera tell together, without any simulation or slope."""
+_MEASURED = "floor_tilt"
+"""Effect that IMU and camera measure together, without any simulation or slope."""
 
 
 class Walk:
-    """Residual of a walk as a function of all parameters."""
+    """Residual of a walk as a function of all parameters.
+
+    Attributes:
+        axes: the parameters (a).
+        pieces: short walks (p), each compared in w channels.
+        block: number of the stretch that every residual belongs to.
+    """
 
     def __init__(self, log: MeasuredLog, env: BatchEnv):
         self.axes = axes()
@@ -53,16 +66,12 @@ class Walk:
         rows = self.pieces.starts[:, None] + np.arange(PIECE_STEPS)
         self._spin = np.mean((record.gyro - record.turning)[rows], 1)
         self._down = np.mean(_turned(record.qpos[:, 3:7], record.gravity)[rows], 1)
-        self.block = (self.pieces.starts * record.dt // STRETCH_S).astype(int)
-        self.scale = np.ones(self.width)
-        self.scale = np.maximum(_scatter(self.raw(np.zeros(len(self.axes)))), 1e-6)
+        raw = self._raw(np.zeros(len(self.axes)))
+        self._scale = np.maximum(_scatter(raw), 1e-6)
+        stretch = (self.pieces.starts * record.dt // STRETCH_S).astype(int)
+        self.block: Int[np.ndarray, " r"] = np.repeat(stretch, raw.shape[1])
 
-    @property
-    def width(self) -> int:
-        """Residuals of one piece."""
-        return len(LOOKS) * 26 + 5
-
-    def raw(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w"]:
+    def _raw(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w"]:
         """Residuals in their own units."""
         missed = self.pieces.misses(candidate(theta, self.axes))
         values = {
@@ -72,23 +81,39 @@ class Walk:
         bias = [values["imu_bias", f"{a}_rad_s"] for a in "xyz"]
         tilt = [values["floor_tilt", f"{a}_rad"] for a in ("roll", "pitch")]
         down = np.asarray(tilted(jnp.array([0.0, 0.0, -1.0]), *tilt))
-        told = [self._spin - bias, (self._down - down)[:, :2]]
-        return np.concatenate([missed.reshape(len(missed), -1), *told], 1)
+        imu = [self._spin - bias, (self._down - down)[:, :2]]
+        return np.concatenate([missed.reshape(len(missed), -1), *imu], 1)
 
-    def residual(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w"]:
-        """Residuals over their scatter; large ones grow slowly."""
-        return _ROBUST * np.arcsinh(self.raw(theta) / self.scale / _ROBUST)
+    def residuals(self, thetas: Float[np.ndarray, "c a"]) -> Float[np.ndarray, "c r"]:
+        """ρ asinh(y / (s ρ)): linear where small, slowly growing where large.
 
-    def tangent(self, theta: Float[np.ndarray, " a"]) -> Float[np.ndarray, "p w a"]:
-        """Its derivative by all parameters."""
-        step = _TANGENT * np.eye(len(theta))
-        return np.stack(
-            [
-                (self.residual(theta + s) - self.residual(theta - s)) / (2 * _TANGENT)
-                for s in step
-            ],
-            -1,
+        Args:
+            thetas: parameters of candidates, in units of their axes [1].
+
+        Returns:
+            Residuals y of all pieces over their scatter s [1]; ρ = 3.
+
+        Source:
+            Ours: a fall of the hand in a few pieces must not outweigh all others.
+        """
+        scaled = [self._raw(theta) / self._scale / _ROBUST for theta in thetas]
+        return np.stack([_ROBUST * np.arcsinh(x).ravel() for x in scaled])
+
+    def fit(self, free: tuple[int, ...], start: Float[np.ndarray, " k"], rounds: int):
+        """Fits some parameters from a start; the others stay at zero."""
+        at = np.zeros(len(self.axes))
+        at[list(free)] = start
+        same = np.ones(len(at))
+        task = Task(
+            start=at,
+            free=np.array(free),
+            center=0.0 * same,
+            deviation=_PRIOR * same,
+            low=-BOUND * same,
+            high=BOUND * same,
+            steps=_STEP * same,
         )
+        return fit_all(self.residuals, [task], rounds)[0]
 
 
 def diagnose_walk(
@@ -112,104 +137,80 @@ def diagnose_walk(
     began = time.monotonic()
     tell("simulating the hand as it is")
     walk = Walk(log, env)
-    zero = np.zeros(len(walk.axes))
-    base, tangent = walk.residual(zero), walk.tangent(zero)
-    ranked = sorted(
-        hypotheses(walk.axes),
-        key=lambda h: -np.sum(_linear_gains(walk, base, tangent, h)),
-    )
-    null = Hypothesis("", "", ())
-    none = np.zeros(int(walk.block.max()) + 1)
-    plain = _judged(walk, null, none, np.zeros(1))
+    count = len(walk.axes)
+    tangent = walk.fit(tuple(range(count)), np.zeros(count), rounds=0)
+    gains = {h: _linear_gains(walk, tangent, h) for h in hypotheses(walk.axes)}
+    ranked = sorted(gains, key=lambda h: -np.sum(gains[h]))
+    plain = _judged(walk, Hypothesis("", "", ()), 0.0, np.zeros(1))
     full = []
     for hypothesis in ranked[:FULL]:
         tell(f"fitting {hypothesis.effect} of {hypothesis.where}")
-        jac = tangent[..., [0, *hypothesis.indices]]
-        every = np.ones(len(walk.block), dtype=bool)
-        start = _step(base, jac, every, np.zeros(jac.shape[-1]))
+        start = _half_step(tangent, (0, *hypothesis.indices))
         full.append(_judged(walk, hypothesis, plain.gains, start))
     full.sort(key=lambda judged: -judged.gain)
-    count = walk.width * np.bincount(walk.block)
-    found = verdict_of(walk.axes, full, plain, count)
+    found = verdict_of(walk.axes, full, plain, np.bincount(walk.block))
     seconds = round(time.monotonic() - began, 3)
     return Diagnosis(**found, log_sha256=(log.sha256,), seed=0, runtime_s=seconds), full
 
 
-def _linear_gains(walk: Walk, base, tangent, hypothesis: Hypothesis) -> np.ndarray:
+def _halves(block: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yields the residuals of one half of the walk and the stretches of the other."""
+    stretches = np.arange(int(block.max()) + 1)
+    for side in (0, 1):
+        yield block % 2 == side, stretches % 2 != side
+
+
+def _linear_gains(walk: Walk, tangent: Fit, hypothesis: Hypothesis) -> np.ndarray:
     """Held-out gains by stretch of a fit along the tangent."""
     gains = np.zeros(int(walk.block.max()) + 1)
-    for side in (0, 1):
-        fit = walk.block % 2 == side
+    for fit, held in _halves(walk.block):
         costs = []
         for free in ((0,), (0, *hypothesis.indices)):
-            jac = tangent[..., list(free)]
-            step = _step(base, jac, fit, np.zeros(len(free)))
-            costs.append(_costs(base + jac @ step, walk.block))
-        held = np.arange(len(gains)) % 2 != side
+            step = _half_step(tangent, free, fit)
+            left = tangent.residual + tangent.jacobian[:, list(free)] @ step
+            costs.append(_costs(left, walk.block))
         gains[held] = 0.5 * (costs[0] - costs[1])[held]
     return gains
 
 
 def _judged(
-    walk: Walk, hypothesis: Hypothesis, plain: np.ndarray, start: np.ndarray
+    walk: Walk,
+    hypothesis: Hypothesis,
+    plain: Float[np.ndarray, " b"] | float,
+    start: Float[np.ndarray, " k"],
 ) -> Judged:
     """Fits in full; without a hypothesis the gains are minus the plain costs.
 
     The fits of either half take the Jacobian of the fit of the whole, from which they
     are not far.
     """
-    free = np.array([0, *hypothesis.indices])
-    search, theta = _search(walk, free), np.zeros(len(walk.axes))
-    theta[free] = search.solved(start)
-    r, jac = (x.reshape(len(walk.block), -1) for x in search.linear(theta[free]))
-    jac = jac.reshape(*r.shape, len(free))
+    fit = walk.fit((0, *hypothesis.indices), start, _ROUNDS)
     gains = np.zeros(int(walk.block.max()) + 1)
-    for side in (0, 1):
-        half = theta.copy()
-        half[free] += _step(r, jac, walk.block % 2 == side, theta[free])
-        held = np.arange(len(gains)) % 2 != side
-        gains[held] = -0.5 * _costs(walk.residual(half), walk.block)[held]
-    spread, wide = search.spread(theta[free], np.repeat(walk.block, walk.width))
-    floor = np.where([walk.axes[i].effect == _TOLD for i in free], 0.0, _FLOOR)
-    half = np.zeros(len(theta))
-    half[free] = wide * np.hypot(spread, floor)
-    return Judged(hypothesis, gains - plain, theta, half)
+    for fitted, held in _halves(walk.block):
+        half = fit.theta.copy()
+        half[fit.free] += _half_step(fit, range(len(fit.free)), fitted)
+        gains[held] = -0.5 * _costs(walk.residuals(half[None])[0], walk.block)[held]
+    errors, wide = standard_errors(fit, np.full(len(fit.theta), _PRIOR), walk.block)
+    measured = [walk.axes[i].effect == _MEASURED for i in fit.free]
+    half = np.zeros(len(fit.theta))
+    half[fit.free] = wide * np.hypot(errors, np.where(measured, 0.0, _FLOOR))
+    return Judged(hypothesis, gains - plain, fit.theta, half)
 
 
-def _step(r: np.ndarray, jac: np.ndarray, chosen: np.ndarray, at: np.ndarray):
-    """Step to the least squares of some pieces."""
-    a = jac[chosen].reshape(-1, jac.shape[-1])
-    gram = a.T @ a + np.eye(len(at)) / _PRIOR**2
-    return -np.linalg.solve(gram, a.T @ r[chosen].ravel() + at / _PRIOR**2)
+def _half_step(
+    fit: Fit, columns: Sequence[int], rows: Bool[np.ndarray, " r"] | None = None
+) -> Float[np.ndarray, " k"]:
+    """Step of some free parameters to the least squares of some residuals."""
+    chosen = slice(None) if rows is None else rows
+    jacobian = fit.jacobian[:, list(columns)][chosen]
+    away = fit.theta[fit.free[list(columns)]]
+    prior = np.full(len(away), _PRIOR)
+    return gauss_newton(jacobian, fit.residual[chosen], away, prior)
 
 
-def _search(walk: Walk, free: Int[np.ndarray, " k"]) -> Search:
-    """Least squares over some parameters."""
-
-    def residuals(thetas: np.ndarray) -> np.ndarray:
-        whole = np.zeros((len(thetas), len(walk.axes)))
-        whole[:, free] = thetas
-        return np.stack([walk.residual(theta).ravel() for theta in whole])
-
-    wide = np.full(len(free), BOUND)
-    return Search(
-        residuals,
-        center=np.zeros(len(free)),
-        deviation=np.full(len(free), _PRIOR),
-        low=-wide,
-        high=wide,
-        step=_TANGENT,
-        rounds=8,
-        enough=2.0,
-        reach=5.0,
-        tried=(0.1,),
-        stretched=(0.5, 1.0, 2.5, 6.0),
-    )
-
-
-def _costs(residual: np.ndarray, block: Int[np.ndarray, " p"]) -> np.ndarray:
+def _costs(residual: np.ndarray, block: Int[np.ndarray, " r"]) -> np.ndarray:
     """Sum of squares by stretch."""
-    return np.bincount(block, np.sum(residual**2, axis=1))
+    return np.bincount(block, residual**2)
 
 
 def _scatter(raw: np.ndarray) -> np.ndarray:

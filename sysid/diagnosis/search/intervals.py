@@ -16,7 +16,7 @@ as they do where the model is not quite true or its errors hang together.
 import math
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sysid.diagnosis.replay.link import DAMPING
 from sysid.diagnosis.replay.residuals import EVERY
@@ -25,6 +25,7 @@ from sysid.diagnosis.replay.track import JointTrack
 from sysid.diagnosis.search.candidate import Model
 from sysid.diagnosis.search.parameters import Slot
 from sysid.diagnosis.search.problem import Problem
+from sysid.least_squares import block_sandwich
 
 COMB_SHARE = 1.5e-4
 """Deviation of a grid's size, relative: half the step by which its slope is found,
@@ -52,10 +53,8 @@ def deviations(problem: Problem, model: Model, samples: int) -> Float[np.ndarray
     scale = max(1.0, model.score / max(samples, 1))
     noise = np.diag(np.linalg.pinv(gram / scale + prior))
     inverse = np.linalg.pinv(gram + prior)
-    slopes = _slopes(problem, model)
-    count = len(slopes)
-    spread = slopes.T @ slopes * count / max(count - 1, 1)
-    excitation = np.diag(inverse @ spread @ inverse)
+    blocks = _blocks(problem)
+    excitation = np.diag(block_sandwich(fit.jacobian, fit.residual, inverse, blocks))
     unknown = [
         _unknown(space.slots[i], float(fit.theta[i]), problem.data) for i in fit.free
     ]
@@ -64,20 +63,16 @@ def deviations(problem: Problem, model: Model, samples: int) -> Float[np.ndarray
     return result
 
 
-def _slopes(problem: Problem, model: Model) -> Float[np.ndarray, "b k"]:
-    """Returns g_b = J_bᵀ r_b less their mean; repeats of a stretch belong together."""
+def _blocks(problem: Problem) -> Int[np.ndarray, " r"]:
+    """Numbers the stretches; repeats of a stretch belong together."""
     samples = np.arange(len(problem.fold))
     samples = samples % problem.repeat if problem.repeat else samples
     block = (EVERY * problem.data.dt * samples // STRETCH_S).astype(int)
     pieces = problem.fold.shape[1]
     apart = 0 if problem.repeat else (block.max() + 1) * np.arange(pieces)
-    block = np.concatenate(
+    return np.concatenate(
         [(block[:, None] + apart * np.ones((1, pieces), int)).ravel()] * 2
     )
-    j, r = model.fit.jacobian, model.fit.residual
-    order = np.unique(block)
-    g = np.stack([j[block == b].T @ r[block == b] for b in order])
-    return g - g.mean(0)
 
 
 def _unknown(slot: Slot, u: float, data: JointTrack) -> float:
