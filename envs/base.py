@@ -1,9 +1,10 @@
 """The environment contract: what `reset` and `step` return."""
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, Protocol, runtime_checkable
 
 import flax.struct
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 
 @flax.struct.dataclass
@@ -30,3 +31,36 @@ class State:
     info: dict[str, Float[Array, "..."]]
     signals: Any
     memory: Any
+
+
+@runtime_checkable
+class VectorEnv(Protocol):
+    """Worlds in step, each reset by itself: what learning and evaluation need."""
+
+    @property
+    def num_envs(self) -> int:
+        """Number of worlds."""
+        ...
+
+    @property
+    def action_size(self) -> int:
+        """Number of policy outputs."""
+        ...
+
+    @property
+    def observation_size(self) -> Mapping[str, int]:
+        """Sizes of "state" and "privileged_state"."""
+        ...
+
+    @property
+    def dt(self) -> float:
+        """Control interval [s]."""
+        ...
+
+    def reset(self, key: PRNGKeyArray) -> State:
+        """Starts an episode in every world."""
+        ...
+
+    def step(self, state: State, action: Float[Array, "b a"]) -> State:
+        """Advances every world by one control step."""
+        ...

@@ -14,7 +14,7 @@ from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HandSpec
 from envs.hand.stance import Stance, stance_of
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample, flatten, push, start_history
 from envs.physics import (
     ModelFields,
@@ -124,16 +124,16 @@ class HandEnv:
         """The scene as a specification."""
         return build_scene(self.hand, self.stance.q_off, self.task.add_scene)
 
-    def fields(self, lasting: Lasting) -> ModelFields:
+    def fields(self, world: PerWorldState) -> ModelFields:
         """All model fields in which a world differs from `mj_model`."""
-        fields = model_fields(self.mj_model, self.spec, lasting.variation)
+        fields = model_fields(self.mj_model, self.spec, world.variation)
         fields = self.plant.effects.change(fields)
-        return self.task.vary_scene(self.plant, fields, lasting)
+        return self.task.vary_scene(self.plant, fields, world)
 
     def reset(self, key: Array) -> State:
         """Begins a new world: its draw of the randomization and its first episode."""
         config = self.config
-        lasting = Lasting(
+        world = PerWorldState(
             key=key,
             variation=draw_variation(stream(key, "variation"), config.randomize),
             weights=scheduled_weights(
@@ -143,12 +143,12 @@ class HandEnv:
             episodes=jnp.zeros((), jnp.int32),
             **self.task.begin_world(),
         )
-        return self._start(lasting)
+        return self._start(world)
 
     def restart(self, state: State) -> State:
         """Begins the next episode of the same world; nothing else is kept."""
-        lasting = state.memory.lasting
-        return self._start(lasting.replace(episodes=lasting.episodes + 1))
+        world = state.memory.world
+        return self._start(world.replace(episodes=world.episodes + 1))
 
     def step(self, state: State, action: Float[Array, "20"]) -> State:
         """Advances one control step.
@@ -162,7 +162,7 @@ class HandEnv:
         action = jnp.clip(action, -config.action_clip, config.action_clip)
         target = self.plant.next_target(memory.target, action, config.action_scale_rad)
         drive, output, invalid = self.plant.step(
-            self.fields(memory.lasting), state.data, memory.drive, target
+            self.fields(memory.world), state.data, memory.drive, target
         )
         signals = self.signals(state.data, output, action, vars(memory))
         memory = memory.replace(
@@ -181,13 +181,11 @@ class HandEnv:
         """Rewards, ends and observes a step whose physics is done."""
         memory, extras = self.task.magnitudes(memory, signals, ~invalid)
         named = vars(signals) | signals.extra | extras
-        lasting, reward, terms = score(
-            self.table, memory.lasting, named, self.dt, ~invalid
-        )
+        world, reward, terms = score(self.table, memory.world, named, self.dt, ~invalid)
         terminated = self.task.terminated(signals) & ~invalid
         timeout = memory.steps >= self.episode_length
         truncated = timeout & ~terminated & ~invalid
-        memory = self.task.advance(memory.replace(lasting=lasting), signals)
+        memory = self.task.advance(memory.replace(world=world), signals)
         sample = self.sample(output.state, vars(memory))
         memory = memory.replace(history=push(memory.history, sample))
         info = {
@@ -207,13 +205,13 @@ class HandEnv:
             memory=memory,
         )
 
-    def _start(self, lasting: Lasting) -> State:
+    def _start(self, world: PerWorldState) -> State:
         """First state of an episode."""
-        key = jax.random.fold_in(stream(lasting.key, "episode"), lasting.episodes)
-        data, target = self.task.start(key, self.plant, lasting)
+        key = jax.random.fold_in(stream(world.key, "episode"), world.episodes)
+        data, target = self.task.start(key, self.plant, world)
         action, zero = jnp.zeros(self.action_size), jnp.zeros(())
-        carried = self.task.begin_episode(key, lasting, data) | {
-            "lasting": lasting,
+        carried = self.task.begin_episode(key, world, data) | {
+            "world": world,
             "steps": jnp.zeros((), jnp.int32),
             "drive": self.plant.begin_drive(target, data),
             "target": target,
@@ -268,7 +266,7 @@ class HandEnv:
         effects = self.plant.effects
         joints = self.plant.joint_reading(carried["drive"], data) - reference
         imu = effects.sense(imu_of(data, effects.down_w))
-        told = sense(noise, carried["lasting"], joints, imu, carried["action"])
+        told = sense(noise, carried["world"], joints, imu, carried["action"])
         return told.replace(inputs=self.task.inputs(carried, told))
 
     def _observations(

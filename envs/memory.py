@@ -13,7 +13,7 @@ from rewards import Schedule
 
 
 @flax.struct.dataclass
-class Lasting:
+class PerWorldState:
     """What survives a reset: the world itself and how long it has trained.
 
     Attributes:
@@ -40,7 +40,7 @@ class Memory:
     """What an episode carries, and what survives it.
 
     Attributes:
-        lasting: what survives a reset.
+        world: what survives a reset.
         steps: control steps of this episode.
         drive: delay line and filters of the actuator chain; with effects, all of it.
         target: joint targets [rad] after the last action.
@@ -51,7 +51,7 @@ class Memory:
         task: what else the task carries, a pytree of its own.
     """
 
-    lasting: Lasting
+    world: PerWorldState
     steps: Int[Array, "*b"]
     drive: DriveState | ChainState
     target: Float[Array, "*b 20"]

@@ -8,7 +8,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from envs.errors import InputError, one_of
-from envs.memory import Lasting
+from envs.memory import PerWorldState
 from rewards import (
     Constant,
     GeometricDecay,
@@ -57,16 +57,16 @@ def scheduled_weights(
 
 def score(
     table: RewardTable,
-    lasting: Lasting,
+    world: PerWorldState,
     named: Mapping[str, Any],
     dt_s: float,
     valid: Bool[Array, ""],
-) -> tuple[Lasting, Float[Array, ""], dict[str, Float[Array, ""]]]:
+) -> tuple[PerWorldState, Float[Array, ""], dict[str, Float[Array, ""]]]:
     """Evaluates the table with the weights of this step, and counts the step.
 
     Args:
         table: reward table.
-        lasting: the world's weights and the step that their schedules have come to.
+        world: the world's weights and the step that their schedules have come to.
         named: signals and magnitudes by name.
         dt_s: control interval [s].
         valid: whether the step counts; an invalid one pays nothing.
@@ -74,11 +74,11 @@ def score(
     Returns:
         The world after the step, the reward and its terms.
     """
-    weights = weights_at(lasting.weights, lasting.total_steps)
+    weights = weights_at(world.weights, world.total_steps)
     total, terms = evaluate(table, named, weights, dt_s)
-    lasting = lasting.replace(total_steps=lasting.total_steps + 1)
+    world = world.replace(total_steps=world.total_steps + 1)
     paid = jax.tree.map(lambda x: jnp.where(valid, x, 0.0), (total, terms))
-    return lasting, *paid
+    return world, *paid
 
 
 def _with_value(schedule: Schedule, value: float) -> Schedule:

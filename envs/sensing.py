@@ -4,7 +4,7 @@ import jax
 from jaxtyping import Array, Float
 
 from envs.actuator.surroundings import Imu
-from envs.memory import Lasting
+from envs.memory import PerWorldState
 from envs.observations import Sample
 from envs.physics import PhysicsState
 from envs.randomize import RandomizeConfig
@@ -25,7 +25,7 @@ def imu_of(data: PhysicsState, down_w: Float[Array, "3"]) -> Imu:
 
 def sense(
     config: RandomizeConfig,
-    lasting: Lasting,
+    world: PerWorldState,
     joint_pos: Float[Array, "20"],
     imu: Imu,
     action: Float[Array, "20"],
@@ -34,14 +34,14 @@ def sense(
 
     Args:
         config: bounds of the noise.
-        lasting: the world's biases, and what its fresh noise is drawn from.
+        world: the world's biases, and what its fresh noise is drawn from.
         joint_pos: joint angles less those that read as zero [rad].
         imu: what a perfectly mounted IMU tells.
         action: last clipped policy output.
     """
-    variation = lasting.variation
-    key = jax.random.fold_in(stream(lasting.key, "noise"), lasting.total_steps)
-    key = jax.random.fold_in(key, lasting.episodes)
+    variation = world.variation
+    key = jax.random.fold_in(stream(world.key, "noise"), world.total_steps)
+    key = jax.random.fold_in(key, world.episodes)
 
     def noisy(name: str, value: Array, bound: float) -> Array:
         noise = jax.random.uniform(stream(key, name), value.shape, minval=-1.0)

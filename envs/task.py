@@ -8,7 +8,7 @@ import mujoco
 from jaxtyping import Array, Bool, Float
 
 from envs.commands import command_term
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
@@ -70,9 +70,10 @@ class HandTask(Protocol):
     """A task for `envs.env.HandEnv`, which does everything else.
 
     All methods are pure functions of one world. A task keeps what it carries in fields
-    of `Lasting` and `Memory`; both have a field `task` for a pytree of its own. Where a
-    method takes `carried`, these are the fields of a `Memory` by name. `BareTask` has
-    the methods that a task without a scene and inputs of its own does not need.
+    of `PerWorldState` and `Memory`; both have a field `task` for a pytree of its own.
+    Where a method takes `carried`, these are the fields of a `Memory` by name.
+    `BareTask` has the methods that a task without a scene and inputs of its own does
+    not need.
     """
 
     @property
@@ -95,23 +96,23 @@ class HandTask(Protocol):
         ...
 
     def vary_scene(
-        self, plant: Plant, fields: ModelFields, lasting: Lasting
+        self, plant: Plant, fields: ModelFields, world: PerWorldState
     ) -> ModelFields:
         """Model fields of a world, from those in which its hand differs."""
         ...
 
     def begin_world(self) -> dict[str, Any]:
-        """The task's fields of `Lasting` in a new world."""
+        """The task's fields of `PerWorldState` in a new world."""
         ...
 
     def start(
-        self, key: Array, plant: Plant, lasting: Lasting
+        self, key: Array, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """First physics state of an episode and the joint targets [rad] held in it."""
         ...
 
     def begin_episode(
-        self, key: Array, lasting: Lasting, state: PhysicsState
+        self, key: Array, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """The task's fields of `Memory` at an episode's start in a physics state."""
         ...
@@ -208,10 +209,10 @@ class BareTask:
         """Nothing but floor and hand."""
 
     def vary_scene(
-        self, plant: Plant, fields: ModelFields, lasting: Lasting
+        self, plant: Plant, fields: ModelFields, world: PerWorldState
     ) -> ModelFields:
         """Only the hand differs."""
-        del plant, lasting
+        del plant, world
         return fields
 
     def scene_signals(

@@ -26,16 +26,16 @@ def through_jax(batch: BatchEnv, repeat: int) -> Layer:
     worlds = jax.jit(batch.reset)(jax.random.key(0))
     ctrl = jnp.tile(jnp.array(env.stance.target_rad), (env.plant.n_substeps, 1))
 
-    def one(lasting: Any, data: Any) -> Any:
-        return env.physics.step(env.fields(lasting), data, ctrl).state
+    def one(world: Any, data: Any) -> Any:
+        return env.physics.step(env.fields(world), data, ctrl).state
 
     @jax.jit
-    def many(lasting: Any, data: Any) -> Any:
+    def many(world: Any, data: Any) -> Any:
         step = jax.vmap(one)
-        return jax.lax.fori_loop(0, repeat, lambda _, d: step(lasting, d), data)
+        return jax.lax.fori_loop(0, repeat, lambda _, d: step(world, d), data)
 
-    lasting = worlds.memory.lasting
-    return Layer(lambda: jax.block_until_ready(many(lasting, worlds.data)), repeat)
+    world = worlds.memory.world
+    return Layer(lambda: jax.block_until_ready(many(world, worlds.data)), repeat)
 
 
 def environment(batch: BatchEnv, repeat: int) -> Layer:

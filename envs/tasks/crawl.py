@@ -12,7 +12,7 @@ from envs.env import HandEnv
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsState
 from envs.plant import Plant, check_interval
 from envs.randomize import RandomizeConfig
@@ -97,18 +97,18 @@ class Crawl(BareTask):
         return {"footprint": init_footprint_memory()}
 
     def begin_episode(
-        self, key: Array, lasting: Lasting, state: PhysicsState
+        self, key: Array, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """A first command and a fresh lift memory."""
-        del lasting, state
+        del world, state
         command = sample_command(key, self.config.command)
         return {"command": command, "lift": init_lift_memory()}
 
     def start(
-        self, key: Array, plant: Plant, lasting: Lasting
+        self, key: Array, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """The stance with noise, at a random heading (ours), under its targets."""
-        del lasting
+        del world
         joint_rad, speed_mps = self.config.reset_joint_rad, self.config.reset_speed_mps
         state = near_stance(key, plant, joint_rad, speed_mps)
         return state, jnp.array(plant.stance.target_rad)
@@ -129,8 +129,8 @@ class Crawl(BareTask):
         config = self.config
         period = round(config.command.resample_s / config.control_dt_s)
         due = memory.steps % period == 0
-        lasting = memory.lasting
-        key = jax.random.fold_in(stream(lasting.key, "resample"), lasting.total_steps)
+        world = memory.world
+        key = jax.random.fold_in(stream(world.key, "resample"), world.total_steps)
         fresh = (sample_command(key, config.command), init_lift_memory())
         command, lift = jax.tree.map(
             lambda new, old: jnp.where(due, new, old),

@@ -36,10 +36,10 @@ def step_gait(
         valid: whether the step counts; the footprint outlives the episode.
         control_dt_s: control interval.
     """
-    lasting = memory.lasting
-    footprint = footprint_step(lasting.footprint, signals.tip_pos_v)
+    world = memory.world
+    footprint = footprint_step(world.footprint, signals.tip_pos_v)
     footprint = jax.tree.map(
-        lambda new, old: jnp.where(valid, new, old), footprint, lasting.footprint
+        lambda new, old: jnp.where(valid, new, old), footprint, world.footprint
     )
     lift, lift_magnitude = lift_step(
         memory.lift,
@@ -53,8 +53,8 @@ def step_gait(
         "footprint_target_v": footprint.target_v,
         "lift_magnitude": lift_magnitude,
     }
-    lasting = lasting.replace(footprint=footprint)
-    return memory.replace(lasting=lasting, lift=lift), extras
+    world = world.replace(footprint=footprint)
+    return memory.replace(world=world, lift=lift), extras
 
 
 def fallen(signals: Signals, limits: TiltLimits) -> Bool[Array, ""]:

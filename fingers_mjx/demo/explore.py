@@ -28,6 +28,21 @@ class Exploring:
     noise_std: Any
 
     @property
+    def num_envs(self) -> int:
+        """Number of worlds."""
+        return self.env.num_envs
+
+    @property
+    def action_size(self) -> int:
+        """Number of policy outputs."""
+        return self.env.action_size
+
+    @property
+    def observation_size(self) -> dict[str, int]:
+        """Sizes of the observations."""
+        return self.env.observation_size
+
+    @property
     def dt(self) -> float:
         """Control interval [s]."""
         return self.env.dt
@@ -38,9 +53,9 @@ class Exploring:
 
     def step(self, state: State, action: Float[Array, "b a"]) -> State:
         """Advances every world under the action and its noise."""
-        lasting = state.memory.lasting
+        world = state.memory.world
         noise = jax.vmap(_noise, (0, 0, None))(
-            lasting.key, lasting.total_steps, action.shape[-1]
+            world.key, world.total_steps, action.shape[-1]
         )
         return self.env.step(state, action + jnp.asarray(self.noise_std) * noise)
 

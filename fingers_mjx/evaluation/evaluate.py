@@ -3,13 +3,12 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
 
 import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.base import State
+from envs.base import State, VectorEnv
 from envs.errors import InputError
 from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.record import MASS_KG, Trace, episode_measures, record
@@ -18,23 +17,6 @@ REPORT_EVERY = 50
 Policy = Callable[[dict[str, Array]], Float[Array, "B actions"]]
 Progress = Callable[[int, int], None]
 TaskMeasures = Callable[[Mapping[str, Array], Array], dict[str, Array]]
-
-
-class BatchEnv(Protocol):
-    """What evaluation needs of a batched environment."""
-
-    @property
-    def dt(self) -> float:
-        """Control interval [s]."""
-        ...
-
-    def reset(self, key: Array) -> State:
-        """Starts an episode in every world."""
-        ...
-
-    def step(self, state: State, action: Float[Array, "B actions"]) -> State:
-        """Advances every world by one control interval."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -59,7 +41,7 @@ class EpisodeTable:
 
 
 def evaluate(
-    batch_env: BatchEnv,
+    batch_env: VectorEnv,
     policy_apply: Policy,
     episodes: int,
     steps: int,
@@ -128,7 +110,7 @@ def _task_measures(measure: TaskMeasures, trace: Trace) -> dict[str, Array]:
     return measure(vars(trace) | trace.extra, steps_alive(trace.done, trace.failed))
 
 
-def _advance(env: BatchEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:
+def _advance(env: VectorEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:
     after = env.step(state, policy_apply(state.obs))
     return after, record(after)
 

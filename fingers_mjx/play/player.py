@@ -23,7 +23,7 @@ from envs.batch import BatchEnv
 from envs.hand.drive.chain import ChainState
 from envs.hand.drive.servo import DriveState
 from envs.hand.figures import figures
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.observations import Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.physics.base import nominal_field
@@ -83,7 +83,7 @@ class Player:
             schedule: a command for each step; drawn as in training if not given.
         """
         start = self._reset(key)
-        model = varied_model(self.env, start.memory.lasting)
+        model = varied_model(self.env, start.memory.world)
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
         memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
@@ -138,7 +138,7 @@ class Player:
                 data.ctrl[:] = command
                 mujoco.mj_step(model, data)
             return drive
-        fields = self._fields(memory.lasting)
+        fields = self._fields(memory.world)
         for _ in range(plant.n_substeps):
             drive, applied = self._begin(fields, _state(data), drive, target)
             _write(model, applied)
@@ -159,25 +159,25 @@ class Player:
         finite = jnp.all(jnp.isfinite(output.state.qpos))
         done = (env.task.terminated(signals) | ~finite).astype(jnp.float32)
         row = record(_judged_state(signals, done))
-        count = memory.lasting.total_steps + 1
+        count = memory.world.total_steps + 1
         after = dataclasses.replace(
             memory,
-            lasting=dataclasses.replace(memory.lasting, total_steps=count),
+            world=dataclasses.replace(memory.world, total_steps=count),
             action=action,
             steps=memory.steps + 1,
         )
         return env.task.advance(after, signals), row
 
 
-def varied_model(env: BatchEnv, lasting: Lasting) -> mujoco.MjModel:
+def varied_model(env: BatchEnv, world: PerWorldState) -> mujoco.MjModel:
     """Returns the model of a world for C MuJoCo, which stops where it diverges.
 
     Args:
         env: of the nominal model.
-        lasting: the world.
+        world: the world.
     """
     model = copy.copy(env.mj_model)
-    _write(model, env.fields(lasting))
+    _write(model, env.fields(world))
     # The compiler notes where a body's inertial frame is the body's own; no more.
     model.body_sameframe[:] = mujoco.mjtSameFrame.mjSAMEFRAME_NONE
     model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_AUTORESET

@@ -12,8 +12,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
-from envs.base import State
-from fingers_mjx.ppo.rollout import BatchEnv, unroll
+from envs.base import State, VectorEnv
+from fingers_mjx.ppo.rollout import unroll
 from fingers_mjx.ppo.state import Learner, TrainState
 from fingers_mjx.ppo.totals import Totals
 from fingers_mjx.ppo.update import improve
@@ -24,7 +24,7 @@ Iteration = Callable[
 ]
 
 
-def make_iteration(env: BatchEnv, learner: Learner) -> Iteration:
+def make_iteration(env: VectorEnv, learner: Learner) -> Iteration:
     """Returns the pure function of one iteration; `compile_iterations` compiles it."""
 
     def iteration(

@@ -1,14 +1,14 @@
 """Experience: unroll the policy in the batched environment, set faulty steps aside."""
 
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any
 
 import flax.struct
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from envs.base import State
+from envs.base import State, VectorEnv
 from envs.physics.room import ROOM
 from fingers_mjx.ppo.brax import (
     PPONetworkParams,
@@ -17,35 +17,6 @@ from fingers_mjx.ppo.brax import (
     sample_action,
 )
 from fingers_mjx.ppo.totals import Totals, count, total
-
-
-@runtime_checkable
-class BatchEnv(Protocol):
-    """What the learner needs of an environment: worlds in step, reset by themselves."""
-
-    @property
-    def num_envs(self) -> int:
-        """Number of worlds."""
-        ...
-
-    @property
-    def action_size(self) -> int:
-        """Number of policy outputs."""
-        ...
-
-    @property
-    def observation_size(self) -> Mapping[str, int]:
-        """Sizes of "state" and "privileged_state"."""
-        ...
-
-    def reset(self, key: PRNGKeyArray) -> State:
-        """Starts an episode in every world."""
-        ...
-
-    def step(self, state: State, action: Float[Array, "b a"]) -> State:
-        """Advances every world by one control step."""
-        ...
-
 
 FAULTS = ("nothing", "state", "reward", "observation")
 """What can be non-finite in a step; "state" is what the environment itself reports."""
@@ -84,7 +55,7 @@ class Rollout:
 
 
 def unroll(
-    env: BatchEnv,
+    env: VectorEnv,
     networks: PPONetworks,
     params: PPONetworkParams,
     normalizer: RunningStatisticsState,

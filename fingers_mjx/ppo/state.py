@@ -9,7 +9,7 @@ import jax.numpy as jnp
 import optax
 from jaxtyping import Array, Int, PRNGKeyArray
 
-from envs.base import State
+from envs.base import State, VectorEnv
 from fingers_mjx.ppo.brax import (
     PPONetworkParams,
     PPONetworks,
@@ -21,7 +21,7 @@ from fingers_mjx.ppo.brax import (
 )
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.health import Health, healthy
-from fingers_mjx.ppo.rollout import BatchEnv, fixed_types
+from fingers_mjx.ppo.rollout import fixed_types
 
 Loss = Callable[..., tuple[Array, dict[str, Array]]]
 
@@ -70,7 +70,7 @@ class Learner:
     config: PpoConfig
 
 
-def make_learner(env: BatchEnv, config: PpoConfig) -> Learner:
+def make_learner(env: VectorEnv, config: PpoConfig) -> Learner:
     """Returns the parts that fit the observations and actions of `env`."""
     networks = make_networks(env.observation_size, env.action_size, config)
     return Learner(
@@ -78,7 +78,7 @@ def make_learner(env: BatchEnv, config: PpoConfig) -> Learner:
     )
 
 
-def init_train_state(learner: Learner, env: BatchEnv, key: PRNGKeyArray) -> TrainState:
+def init_train_state(learner: Learner, env: VectorEnv, key: PRNGKeyArray) -> TrainState:
     """Returns untrained networks, a fresh optimizer and an empty normalizer."""
     key_policy, key_value = jax.random.split(key)
     params = PPONetworkParams(  # pyright: ignore[reportCallIssue]
@@ -95,7 +95,7 @@ def init_train_state(learner: Learner, env: BatchEnv, key: PRNGKeyArray) -> Trai
     return strong(state)
 
 
-def train_template(env: BatchEnv, config: PpoConfig) -> TrainState:
+def train_template(env: VectorEnv, config: PpoConfig) -> TrainState:
     """Returns shapes and types of what learning changes."""
     learner = make_learner(env, config)
     return jax.eval_shape(

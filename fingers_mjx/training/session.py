@@ -9,11 +9,11 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.base import State
+from envs.base import State, VectorEnv
 from envs.config.typed import to_dict
 from fingers_mjx.ppo.config import TrainConfig, bound_fields
 from fingers_mjx.ppo.iteration import Iteration, make_iteration, repeat_iterations
-from fingers_mjx.ppo.rollout import FAULTS, BatchEnv
+from fingers_mjx.ppo.rollout import FAULTS
 from fingers_mjx.ppo.state import (
     Carry,
     TrainState,
@@ -69,7 +69,7 @@ class Session:
         terms: names that `Health.first_term` points into.
     """
 
-    def __init__(self, env: BatchEnv, config: TrainConfig):
+    def __init__(self, env: VectorEnv, config: TrainConfig):
         self.env, self.config = env, config
         self.learner = make_learner(env, config.ppo)
         iteration = repeat_iterations(
@@ -110,7 +110,7 @@ class Session:
 
 
 def bound(
-    env: BatchEnv, config: TrainConfig, env_config: Any, identity: Mapping[str, Any]
+    env: VectorEnv, config: TrainConfig, env_config: Any, identity: Mapping[str, Any]
 ) -> dict[str, Any]:
     """Returns what a resumed run must share with the saved one.
 

@@ -5,11 +5,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from envs.base import VectorEnv
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from fingers_mjx.ppo.config import TrainConfig, free_fields
 from fingers_mjx.ppo.config_check import check_config
-from fingers_mjx.ppo.rollout import BatchEnv
 from fingers_mjx.ppo.state import Carry, strong
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
@@ -44,7 +44,7 @@ class Result:
 
 
 def train(
-    make_env: Callable[[int], BatchEnv],
+    make_env: Callable[[int], VectorEnv],
     config: TrainConfig,
     run_dir: Path,
     *,

@@ -71,12 +71,10 @@ def beyond(a, b):
 
 def smoother(state):
     """Nine tenths of the friction of every tip."""
-    lasting = state.memory.lasting
-    friction = 0.9 * lasting.variation.tip_friction
-    lasting = lasting.replace(
-        variation=lasting.variation.replace(tip_friction=friction)
-    )
-    return state.replace(memory=state.memory.replace(lasting=lasting))
+    world = state.memory.world
+    friction = 0.9 * world.variation.tip_friction
+    world = world.replace(variation=world.variation.replace(tip_friction=friction))
+    return state.replace(memory=state.memory.replace(world=world))
 
 
 @pytest.fixture(scope="module")

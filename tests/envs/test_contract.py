@@ -166,7 +166,7 @@ def test_a_state_that_is_not_finite_ends_its_episode_and_is_counted(
         assert not term.startswith("reward") or x[1] == 0, term
     carried = (state.data, state.obs, state.memory)
     # Schedules may hold infinite steps; everything else is finite.
-    weights = "lasting.weights"
+    weights = "world.weights"
     leaves = jax.tree_util.tree_leaves_with_path(carried)
     for path, x in leaves:
         leaf = jax.tree_util.keystr(path)
@@ -204,9 +204,9 @@ def test_weights_are_arguments_of_the_compiled_step(task):
         return 2 * x if path[-1].name in values else x
 
     memory = task.first.memory
-    weights = jax.tree_util.tree_map_with_path(doubled, memory.lasting.weights)
-    lasting = memory.lasting.replace(weights=weights)
-    dear = task.first.replace(memory=memory.replace(lasting=lasting))
+    weights = jax.tree_util.tree_map_with_path(doubled, memory.world.weights)
+    world = memory.world.replace(weights=weights)
+    dear = task.first.replace(memory=memory.replace(world=world))
     action = task.actions(1)[0]
     reward = np.asarray(task.step(task.first, action).reward)
     programs = task.step._cache_size()
@@ -247,12 +247,12 @@ def test_a_world_does_not_depend_on_how_many_are_stepped(task, rollout, make_com
 
 
 def test_every_world_counts_its_own_steps(task, rollout):
-    lasting = rollout[-1].memory.lasting
-    np.testing.assert_array_equal(lasting.total_steps, len(rollout))
+    world = rollout[-1].memory.world
+    np.testing.assert_array_equal(world.total_steps, len(rollout))
     ends = sum(np.asarray(state.done) for state in rollout)
-    np.testing.assert_array_equal(lasting.episodes, ends)
+    np.testing.assert_array_equal(world.episodes, ends)
 
 
 def test_the_draw_of_a_world_outlives_its_episodes(task, rollout, differing):
-    kept = [state.memory.lasting.variation for state in (task.first, rollout[-1])]
+    kept = [state.memory.world.variation for state in (task.first, rollout[-1])]
     assert differing(*kept) == []

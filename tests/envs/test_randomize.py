@@ -129,13 +129,13 @@ def test_a_varied_model_is_that_of_a_hand_file_with_the_same_values(
 def one_changed_per_world(state, changes):
     """World 0's state in all worlds; world i + 1 has the i-th change of its draw."""
     state = jax.tree.map(lambda x: jnp.broadcast_to(x[:1], x.shape), state)
-    draw = state.memory.lasting.variation
+    draw = state.memory.world.variation
     nominal = jax.tree.map(lambda x, y: jnp.zeros_like(x) + y, draw, NOMINAL)
     for index, (name, value) in enumerate(changes.items(), start=1):
         changed = getattr(nominal, name).at[index].set(jnp.asarray(value))
         nominal = nominal.replace(**{name: changed})
-    lasting = state.memory.lasting.replace(variation=nominal)
-    return state.replace(memory=state.memory.replace(lasting=lasting))
+    world = state.memory.world.replace(variation=nominal)
+    return state.replace(memory=state.memory.replace(world=world))
 
 
 def test_each_quantity_reaches_the_physics_of_its_world_only(crawl):

@@ -42,7 +42,7 @@ class CrawlAmongToys(Crawl):
     def add_scene(self, spec):
         add_toys(spec)
 
-    def vary_scene(self, plant, fields, lasting):
+    def vary_scene(self, plant, fields, world):
         heavy = fields["body_mass"].at[plant.mj_model.body("brick").id].multiply(3.0)
         return fields | {"body_mass": heavy}
 

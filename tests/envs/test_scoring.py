@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.memory import Lasting
+from envs.memory import PerWorldState
 from envs.scoring import scheduled_weights, score
 from rewards import CRAWL, RewardTerm, StepSwitch, precomputed
 
@@ -15,7 +15,7 @@ TABLE = (
 
 def world(steps=0, values=None, pace=1.0):
     weights = scheduled_weights(TABLE, values or {}, pace)
-    return Lasting(
+    return PerWorldState(
         key=None,
         variation=None,
         footprint=None,
@@ -25,15 +25,15 @@ def world(steps=0, values=None, pace=1.0):
     )
 
 
-def pay(lasting, valid=True, a=3.0):
+def pay(world, valid=True, a=3.0):
     named = {"a": jnp.float32(a), "b": jnp.float32(5.0)}
-    return score(TABLE, lasting, named, 0.02, jnp.array(valid))
+    return score(TABLE, world, named, 0.02, jnp.array(valid))
 
 
 def test_terms_are_weight_times_magnitude_times_interval():
-    lasting, reward, terms = pay(world())
+    after, reward, terms = pay(world())
     assert terms == pytest.approx({"one": 2 * 3 * 0.02, "two": 0.0})
-    assert reward == pytest.approx(0.12) and lasting.total_steps == 1
+    assert reward == pytest.approx(0.12) and after.total_steps == 1
 
 
 def test_schedules_follow_the_steps_before_this_one():
@@ -49,8 +49,8 @@ def test_values_replace_the_start_or_the_end_of_a_switch():
 
 @pytest.mark.parametrize("a", [1.0, np.nan, np.inf])
 def test_an_invalid_step_pays_nothing_and_counts(a):
-    lasting, reward, terms = pay(world(), valid=False, a=a)
-    assert reward == 0 and lasting.total_steps == 1
+    after, reward, terms = pay(world(), valid=False, a=a)
+    assert reward == 0 and after.total_steps == 1
     assert terms == {"one": 0.0, "two": 0.0}
 
 

@@ -15,17 +15,17 @@ NONE = no_randomization(0.88)
 def world(crawl):
     """Memory, physics state and reference of one world."""
     memory, data = jax.tree.map(lambda x: x[0], (crawl.first.memory, crawl.first.data))
-    still = jax.tree.map(jnp.zeros_like, memory.lasting.variation)
-    lasting = memory.lasting.replace(variation=still)
-    return lasting, data, jnp.array(crawl.batch.stance.joint_pos_rad)
+    still = jax.tree.map(jnp.zeros_like, memory.world.variation)
+    kept = memory.world.replace(variation=still)
+    return kept, data, jnp.array(crawl.batch.stance.joint_pos_rad)
 
 
 @pytest.fixture(scope="module")
 def read(world):
-    lasting, data, reference = world
+    kept, data, reference = world
 
     def take(config, data=data, **changes):
-        own = lasting.replace(**changes)
+        own = kept.replace(**changes)
         imu = imu_of(data, jnp.array([0.0, 0.0, -1.0]))
         return sense(config, own, data.qpos[7:] - reference, imu, jnp.full(20, 0.25))
 

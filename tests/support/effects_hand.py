@@ -86,7 +86,7 @@ def run(env, params, targets):
     Returns:
         Physics states, readings of the joints and of the IMU, sensors: [worlds, T, …].
     """
-    lasting = env.reset(jax.random.key(0)).memory.lasting
+    world = env.reset(jax.random.key(0)).memory.world
     low, high = env.plant.joint_range.T
     targets = jnp.asarray(targets, jnp.float32) + jnp.array(env.stance.target_rad)
     targets = jnp.clip(targets, low, high)
@@ -98,7 +98,7 @@ def run(env, params, targets):
             chain=dataclasses.replace(env.plant.chain, params=chain),
             effects=dataclasses.replace(env.plant.effects, params=scene),
         )
-        fields = model_fields(plant.mj_model, plant.spec, lasting.variation)
+        fields = model_fields(plant.mj_model, plant.spec, world.variation)
         fields = plant.effects.change(fields)
         start = plant.rest.state
 

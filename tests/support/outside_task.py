@@ -35,10 +35,10 @@ class Crouch(BareTask):
     def begin_world(self):
         return {}
 
-    def begin_episode(self, key, lasting, state):
+    def begin_episode(self, key, world, state):
         return {"command": jnp.zeros(3)}
 
-    def start(self, key, plant, lasting):
+    def start(self, key, plant, world):
         return near_stance(key, plant, 0.05, 0.0), jnp.array(plant.stance.target_rad)
 
     def magnitudes(self, memory, signals, valid):

@@ -44,6 +44,7 @@ class Probe:
     truncates: bool = False
     fault: Fault = Fault()
     action_size: int = 1
+    dt: float = 0.02
 
     @property
     def observation_size(self):

@@ -16,7 +16,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
 from envs.hand.stance import Stance
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
@@ -140,24 +140,24 @@ class Keyboard:
         free_fingertip(spec, TIP_LINKS[FINGER_INDEX])
 
     def vary_scene(
-        self, plant: Plant, fields: ModelFields, lasting: Lasting
+        self, plant: Plant, fields: ModelFields, world: PerWorldState
     ) -> ModelFields:
         """The world's own keys, and how high they are."""
-        return keyboard_fields(plant.mj_model, fields, self._draw(lasting))
+        return keyboard_fields(plant.mj_model, fields, self._draw(world))
 
     def begin_world(self) -> dict[str, Any]:
         """Nothing that the world's random key does not give."""
         return {}
 
     def start(
-        self, key: Array, plant: Plant, lasting: Lasting
+        self, key: Array, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """The stance with noise, before a keyboard that is not quite aligned.
 
         The keyboard stays where it is in the world. The hand is turned about Down and
         shifted, by what the keyboard would be turned and shifted against the hand.
         """
-        del lasting
+        del world
         variation, rest = self.config.keyboard, plant.rest.state
         turn, shift = _misalignment(key, variation)
         down_w = jnp.array([PLACEMENT.x_w, PLACEMENT.y_w, 0.0])
@@ -178,10 +178,10 @@ class Keyboard:
         return PhysicsState(qpos, zero, zero), jnp.array(self.stance.target_rad)
 
     def begin_episode(
-        self, key: Array, lasting: Lasting, state: PhysicsState
+        self, key: Array, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """A gap before the first request; all keys up."""
-        del lasting
+        del world
         requests = begin_requests(key, self.config.requests, self.config.control_dt_s)
         v_quat_w = multiply(state.qpos[3:7], jnp.array(self.stance.q_off))
         feet_v = jnp.array(self.stance.footprint_v)[jnp.array(SUPPORTS)]
@@ -220,7 +220,7 @@ class Keyboard:
             other tips. drift_m, tilt_deg, gravity_v, stance_lost: of the stance.
         """
         memory: KeyboardMemory = carried["task"]
-        draw = self._draw(carried["lasting"])
+        draw = self._draw(carried["world"])
         depth_m = output.state.qpos[HAND_NQ : HAND_NQ + len(KEY_NAMES)]
         down, pressed = key_events(memory.down, depth_m, draw.actuation_m)
         requests, config = memory.requests, self.config
@@ -250,7 +250,7 @@ class Keyboard:
         would make their first press a huge number. Where the tip stands tells it.
         """
         memory: KeyboardMemory = carried["task"]
-        draw = self._draw(carried["lasting"])
+        draw = self._draw(carried["world"])
         v_quat_w = multiply(signals.palm_quat_w, jnp.array(self.stance.q_off))
         offsets = jax.vmap(lambda x: unrotate(v_quat_w, x))(
             signals.extra["arrow_offset_m"]
@@ -274,9 +274,9 @@ class Keyboard:
 
     def advance(self, memory: Memory, signals: Signals) -> Memory:
         """The keys' state, and the next request when this one is decided."""
-        task, extra, lasting = memory.task, signals.extra, memory.lasting
-        key = jax.random.fold_in(stream(lasting.key, "requests"), lasting.total_steps)
-        key = jax.random.fold_in(key, lasting.episodes)
+        task, extra, world = memory.task, signals.extra, memory.world
+        key = jax.random.fold_in(stream(world.key, "requests"), world.total_steps)
+        key = jax.random.fold_in(key, world.episodes)
         ended = extra["hit"] + extra["wrong"] + extra["timeout"] > 0
         config, dt_s = self.config.requests, self.config.control_dt_s
         requests = next_request(key, task.requests, ended, config, dt_s)
@@ -295,8 +295,8 @@ class Keyboard:
         """See `envs.tasks.keyboard.measures`."""
         return press_measures(recorded, counts)
 
-    def _draw(self, lasting: Lasting) -> KeyboardDraw:
-        return draw_keyboard(lasting.key, self.config.keyboard)
+    def _draw(self, world: PerWorldState) -> KeyboardDraw:
+        return draw_keyboard(world.key, self.config.keyboard)
 
     def _tip_signals(
         self, signals: Signals, draw: KeyboardDraw, requested: Float[Array, " keys"]

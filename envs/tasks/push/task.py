@@ -14,7 +14,7 @@ from envs.env import HandEnv
 from envs.errors import check_ordered
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
@@ -139,11 +139,11 @@ class Push(BareTask):
         add_cube(spec, (low + high) / 2)
 
     def vary_scene(
-        self, plant: Plant, fields: ModelFields, lasting: Lasting
+        self, plant: Plant, fields: ModelFields, world: PerWorldState
     ) -> ModelFields:
         """The cube's friction."""
         cube = plant.mj_model.geom(CUBE).id
-        friction = _uniform(lasting.key, "cube", self.config.object_friction)
+        friction = _uniform(world.key, "cube", self.config.object_friction)
         changed = fields["geom_friction"].at[cube, 0].set(friction)
         return fields | {"geom_friction": changed}
 
@@ -152,10 +152,10 @@ class Push(BareTask):
         return {"footprint": init_footprint_memory()}
 
     def start(
-        self, key: Array, plant: Plant, lasting: Lasting
+        self, key: Array, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """The stance with noise at a random heading, the cube before it."""
-        del lasting
+        del world
         config = self.config
         state = near_stance(key, plant, config.reset_joint_rad, config.reset_speed_mps)
         bearing = _uniform(key, "object_bearing", config.object_bearing_deg)
@@ -165,10 +165,10 @@ class Push(BareTask):
         return state, jnp.array(plant.stance.target_rad)
 
     def begin_episode(
-        self, key: Array, lasting: Lasting, state: PhysicsState
+        self, key: Array, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """A target, a camera, and the first guidance."""
-        del lasting
+        del world
         config, qpos = self.config, state.qpos
         bearing = _uniform(key, "target_bearing", config.target_bearing_deg)
         angle = self._heading(qpos[3:7]) + jnp.deg2rad(bearing)
@@ -238,9 +238,9 @@ class Push(BareTask):
 
     def advance(self, memory: Memory, signals: Signals) -> Memory:
         """The next camera sample, the tracker's and the guide's answer to the state."""
-        task, lasting, extra = memory.task, memory.lasting, signals.extra
-        key = jax.random.fold_in(stream(lasting.key, "camera"), lasting.total_steps)
-        key = jax.random.fold_in(key, lasting.episodes)
+        task, world, extra = memory.task, memory.world, signals.extra
+        key = jax.random.fold_in(stream(world.key, "camera"), world.total_steps)
+        key = jax.random.fold_in(key, world.episodes)
         now_s = memory.steps * self.config.control_dt_s
         qpos = jnp.concatenate(
             [signals.palm_pos_w, signals.palm_quat_w, signals.joint_pos]

@@ -14,7 +14,7 @@ from envs.commands import CommandConfig, sample_command
 from envs.env import HandEnv
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.stance import Stance, stance_of
-from envs.memory import Lasting, Memory
+from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply, unrotate
@@ -110,10 +110,10 @@ class Recovery(BareTask):
         return {}
 
     def begin_episode(
-        self, key: Array, lasting: Lasting, state: PhysicsState
+        self, key: Array, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """The command of the whole episode, the side of the fall, and no settling."""
-        del lasting, state
+        del world, state
         sides = jnp.array([list(SIDES).index(side) for side in self.falls.side])
         settling = start_settling(len(self.stance.target_rad))
         return {
@@ -122,7 +122,7 @@ class Recovery(BareTask):
         }
 
     def start(
-        self, key: Array, plant: Plant, lasting: Lasting
+        self, key: Array, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
         """One of the fallen poses at rest, at a random heading.
 

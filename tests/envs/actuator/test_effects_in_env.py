@@ -74,8 +74,8 @@ def test_a_hand_whose_effects_vanish_moves_as_one_without(worlds):
     env = rig.env_with()
     limits = np.asarray(env.plant.joint_range)
     target = np.clip(motion() + np.array(env.stance.target_rad), *limits.T)
-    lasting = env.reset(jax.random.key(0)).memory.lasting
-    fields, start = env.fields(lasting), env.plant.rest.state
+    world = env.reset(jax.random.key(0)).memory.world
+    fields, start = env.fields(world), env.plant.rest.state
 
     def step(carry, target):
         drive, data = carry
@@ -96,9 +96,9 @@ def test_the_default_hand_keeps_the_servo_of_the_physics():
     assert isinstance(state.memory.drive, DriveState)
     assert env.physics.n_substeps == env.plant.n_substeps == 4
     assert not env.mj_model.dof_frictionloss.any() and env.mj_model.npair == 0
-    lasting = state.memory.lasting
-    given = model_fields(env.mj_model, env.spec, lasting.variation)
-    fields = env.fields(lasting)
+    world = state.memory.world
+    given = model_fields(env.mj_model, env.spec, world.variation)
+    fields = env.fields(world)
     assert set(fields) == set(given)
     assert all(np.array_equal(fields[k], given[k]) for k in given)
     imu = env.plant.effects

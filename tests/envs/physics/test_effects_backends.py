@@ -19,8 +19,8 @@ EFFECTS = (
 
 def motion(env):
     """Joint angles and load of control steps with targets that jump, [T, 20]."""
-    lasting = env.reset(jax.random.key(0)).memory.lasting
-    fields, start = env.fields(lasting), env.plant.rest.state
+    world = env.reset(jax.random.key(0)).memory.world
+    fields, start = env.fields(world), env.plant.rest.state
     target = jnp.array(env.stance.target_rad) + 0.05 * jnp.sin(jnp.arange(20.0))
 
     def step(carry, _):

@@ -16,8 +16,8 @@ TERMS = {row.name for row in CRAWL}
 
 
 def with_lasting(state, **changes):
-    lasting = state.memory.lasting.replace(**changes)
-    return state.replace(memory=state.memory.replace(lasting=lasting))
+    world = state.memory.world.replace(**changes)
+    return state.replace(memory=state.memory.replace(world=world))
 
 
 def test_sizes(crawl):
@@ -79,7 +79,7 @@ def test_curricula_follow_the_steps_of_each_world(crawl):
 
 def test_lift_weight_decays_to_a_tenth(crawl):
     """Paper: 6.25 for 18,000 steps, then geometric to 0.625 over 36,000."""
-    lift = crawl.first.memory.lasting.weights["lift"]
+    lift = crawl.first.memory.world.weights["lift"]
     one = jax.tree.map(lambda x: x[0], lift)
     for steps, weight in (
         (0, 6.25),
@@ -119,13 +119,13 @@ def test_a_step_is_rewarded_for_the_command_that_the_policy_saw(crawl):
 
 
 def test_footprint_is_captured_in_the_first_step_and_kept_over_resets(crawl):
-    assert not np.asarray(crawl.first.memory.lasting.footprint.captured).any()
+    assert not np.asarray(crawl.first.memory.world.footprint.captured).any()
     states = crawl.roll(crawl.first, crawl.actions(crawl.batch.episode_length + 3))
-    first = states[0].memory.lasting.footprint
+    first = states[0].memory.world.footprint
     assert np.asarray(first.captured).all()
     np.testing.assert_array_equal(first.target_v, states[0].signals.tip_pos_v)
-    assert np.asarray(states[-1].memory.lasting.episodes == 1).all()
-    last = states[-1].memory.lasting.footprint
+    assert np.asarray(states[-1].memory.world.episodes == 1).all()
+    last = states[-1].memory.world.footprint
     np.testing.assert_array_equal(last.target_v, first.target_v)
 
 
@@ -133,7 +133,7 @@ def test_an_invalid_first_step_captures_no_footprint(crawl):
     qvel = crawl.first.data.qvel.at[1, 0].set(jnp.nan)
     bad = crawl.first.replace(data=crawl.first.data.replace(qvel=qvel))
     state = crawl.step(bad, crawl.actions(1)[0])
-    captured = np.asarray(state.memory.lasting.footprint.captured)
+    captured = np.asarray(state.memory.world.footprint.captured)
     np.testing.assert_array_equal(captured, np.arange(8) != 1)
 
 

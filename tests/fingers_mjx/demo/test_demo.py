@@ -119,8 +119,8 @@ def test_exploration_noise_is_each_worlds_own_and_repeatable():
     keys = jax.random.split(jax.random.key(0), 2)
 
     def at(step):
-        lasting = SimpleNamespace(key=keys, total_steps=jnp.full(2, step))
-        state = SimpleNamespace(memory=SimpleNamespace(lasting=lasting))
+        world = SimpleNamespace(key=keys, total_steps=jnp.full(2, step))
+        state = SimpleNamespace(memory=SimpleNamespace(world=world))
         return np.asarray(Exploring(Still(), 0.5).step(state, jnp.ones((2, 2000))))
 
     drawn = at(3)

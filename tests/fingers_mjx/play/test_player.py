@@ -85,9 +85,9 @@ def test_another_world_moves_otherwise(player, in_environment):
 
 def test_a_varied_model_is_the_one_of_the_world(player):
     env = player.env
-    lasting = jax.jit(env.env.reset)(KEY).memory.lasting
-    model = varied_model(env, lasting)
-    for name, value in env.fields(lasting).items():
+    world = jax.jit(env.env.reset)(KEY).memory.world
+    model = varied_model(env, world)
+    for name, value in env.fields(world).items():
         np.testing.assert_allclose(getattr(model, name), value, rtol=1e-6)
     assert not np.allclose(model.body_ipos, env.mj_model.body_ipos)
     assert not np.allclose(model.geom_friction, env.mj_model.geom_friction)
@@ -106,9 +106,9 @@ def test_the_nominal_hand_starts_in_its_stance(setup, bundle):
     one = Player(env, bundle).play(KEY, 2)
     np.testing.assert_allclose(one.qpos[0, 7:], env.stance.joint_pos_rad, atol=1e-6)
     np.testing.assert_allclose(one.trace.command, [[0.1, 0.0, 0.2]] * 2, atol=1e-7)
-    lasting = jax.jit(env.env.reset)(KEY).memory.lasting
+    world = jax.jit(env.env.reset)(KEY).memory.world
     mu = setup.hand.tip_friction.value
-    friction = varied_model(env, lasting).geom_friction
+    friction = varied_model(env, world).geom_friction
     np.testing.assert_allclose(friction[list(env.spec.tip_geoms), 0], mu, rtol=1e-6)
 
 

@@ -33,10 +33,10 @@ TRAIN = TrainConfig(
     ),
 )
 CARRIED = (
-    "worlds/memory/lasting/footprint/",
-    "worlds/memory/lasting/variation/",
-    "worlds/memory/lasting/total_steps",
-    "worlds/memory/lasting/key",
+    "worlds/memory/world/footprint/",
+    "worlds/memory/world/variation/",
+    "worlds/memory/world/total_steps",
+    "worlds/memory/world/key",
     "worlds/memory/lift/",
     "worlds/memory/history/",
     "worlds/memory/drive/",
@@ -98,7 +98,7 @@ def test_resumed_crawl_is_bit_equal_to_a_straight_one(env, straight, tmp_path):
         assert any(name.startswith(part) for name in arrays), part
     moved = [k for k in arrays if arrays[k].tobytes() != halfway[k].tobytes()]
     assert "worlds/data/qpos" in moved and "worlds/memory/lift/phase" in moved
-    steps = arrays["worlds/memory/lasting/total_steps"]
+    steps = arrays["worlds/memory/world/total_steps"]
     assert (steps == ITERATIONS * TRAIN.ppo.unroll_length).all()
     footprints = [k for k in arrays if k.startswith(CARRIED[0])]
     assert not set(footprints) & set(moved)  # captured once, kept over resets
@@ -132,10 +132,10 @@ def test_resumed_crawl_on_warp_goes_on_where_it_stopped(tmp_path):
     run(tmp_path / "run", env, made, resume=True)
     arrays = leaves(tmp_path / "run")[1]
     step = 2 * TRAIN.ppo.unroll_length
-    name = "worlds/memory/lasting/total_steps"
+    name = "worlds/memory/world/total_steps"
     np.testing.assert_array_equal(arrays[name], saved[name] + step)
     count = "train/normalizer/count/lo"
     assert arrays[count] == saved[count] + step * TRAIN.num_envs
-    kept = [k for k in arrays if k.startswith("worlds/memory/lasting/variation/")]
+    kept = [k for k in arrays if k.startswith("worlds/memory/world/variation/")]
     for k in kept:
         np.testing.assert_array_equal(arrays[k], saved[k])
