@@ -1,11 +1,8 @@
-"""The shim's behaviours in the closed loop: recovery, detector, ramp, next policy.
+"""The robot's behaviours in the closed loop: recovery, detector, ramp, next policy.
 
 `fingers_robot.behaviour.Policies` decides which policy runs and when a ramp moves the
-targets, told by packets as the supervisor sends them; here it has the calls of a
-`PolicyController`.
+targets; here it has the calls of a `PolicyController`.
 """
-
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -13,15 +10,14 @@ from jaxtyping import Float
 from envs.errors import InputError
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
-from fingers_mjx.play.upright import orientation_of
 from fingers_robot.behaviour.command import DEADZONE, FixedCommand, Ranges
+from fingers_robot.behaviour.exchange import Answer, Query
 from fingers_robot.behaviour.policies import Policies
-from fingers_robot.runtime.link import OBSERVATION, Answer, decode_answer
 from fingers_robot.safety import PolicyFault
 
 
 class Behaviours:
-    """A recovery policy, and the policy to which it leads, under the shim's rules.
+    """A recovery policy, and the policy to which it leads, under the robot's rules.
 
     Args:
         recovery: policy that the operator has selected.
@@ -105,13 +101,17 @@ class Behaviours:
         runs: bool,
     ) -> Answer:
         self.tick += runs
-        packet: Any = np.zeros((), OBSERVATION)
-        packet["tick"], packet["t_s"] = self.tick, max(self.tick, 0) * self._dt_s
-        packet["pos"], packet["gyro"] = joint_pos, angvel_b
-        packet["quat"] = orientation_of(gravity_b)
-        packet["target"] = self.target_rad
-        packet["runs"], packet["policy"] = runs, self._selected
-        return decode_answer(self._policies.answer(packet[()]))
+        query = Query(
+            tick=self.tick,
+            t_s=max(self.tick, 0) * self._dt_s,
+            joint_pos=np.array(joint_pos, float),
+            quat_w=orientation_of(gravity_b),
+            gyro_b=np.array(angvel_b, float),
+            target_rad=self.target_rad,
+            runs=runs,
+            policy=self._selected,
+        )
+        return self._policies.answer(query)
 
 
 def sticks_for(command: tuple[float, ...], ranges: Ranges) -> tuple[float, ...]:
@@ -133,3 +133,20 @@ def sticks_for(command: tuple[float, ...], ranges: Ranges) -> tuple[float, ...]:
         out = DEADZONE + (1.0 - DEADZONE) * share if value else 0.0
         sticks.append(float(np.copysign(out, value)))
     return tuple(sticks)
+
+
+def orientation_of(gravity_b: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
+    """Returns the shortest rotation, w x y z, under which gravity has that direction.
+
+    q = (1 + c, g × d) normalized, with d = (0, 0, −1) and c = g · d. Its heading means
+    nothing. Upside down, where the shortest rotation is not unique, it is half a turn
+    about x.
+
+    Args:
+        gravity_b: unit vector of gravity in the palm frame.
+    """
+    x, y, z = np.asarray(gravity_b, float) / np.linalg.norm(gravity_b)
+    if 1.0 - z < 1e-9:
+        return np.array([0.0, 1.0, 0.0, 0.0])
+    quat = np.array([1.0 - z, -y, x, 0.0])
+    return quat / np.linalg.norm(quat)

@@ -13,10 +13,10 @@ import numpy as np
 from fingers_deploy.bundle import Bundle
 from fingers_deploy.controller import PolicyController
 from fingers_robot.behaviour.command import FixedCommand
+from fingers_robot.behaviour.exchange import Answer, Query
 from fingers_robot.behaviour.policies import Policies
 from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
 from fingers_robot.runtime.core import Core
-from fingers_robot.runtime.link import Answer, decode_answer
 from fingers_robot.runtime.ticker import Tick
 from fingers_robot.safety import Mode, Operator, make_limits
 from fingers_robot.simulator.hand import SimulatedHand
@@ -123,23 +123,22 @@ class LabLink:
         self.silent = False
         self.delay_s = ANSWER_S
         self.tamper: Callable = lambda answer, t: answer
-        self._due: list[tuple[float, bytes]] = []
+        self._due: list[tuple[float, Answer]] = []
 
-    def send(self, observation: np.ndarray) -> None:
-        """Answers the observation; the answer arrives later."""
+    def send(self, query: Query) -> None:
+        """Answers the query; the answer arrives later."""
         if self.open and not self.silent:
-            packet = np.frombuffer(observation.tobytes(), observation.dtype)[0]
-            answer = self.policies.answer(packet)
+            answer = self.policies.answer(query)
             self._due.append((self._clock() + self.delay_s, answer))
 
     def poll(self) -> Answer | None:
         """Returns the newest answer that has arrived."""
         t = self._clock()
-        arrived = [data for due, data in self._due if due <= t]
-        self._due = [(due, data) for due, data in self._due if due > t]
+        arrived = [answer for due, answer in self._due if due <= t]
+        self._due = [(due, answer) for due, answer in self._due if due > t]
         if not arrived or not self.open:
             return None
-        answer = decode_answer(arrived[-1])
+        answer = arrived[-1]
         proposal = self.tamper(answer.proposal, t)
         return None if proposal is None else replace(answer, proposal=proposal)
 

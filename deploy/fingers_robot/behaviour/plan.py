@@ -12,14 +12,12 @@ from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Interface
-from fingers_robot.runtime.link import encode_answer
-from fingers_robot.safety.detectors.policy import complement
+from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
 from fingers_robot.safety.motion import toward
-from fingers_robot.safety.types import Proposal
 
 Array = NDArray[np.float64]
 _MAX_BYTES = 64 * 2**20
-_NO_COMMAND = np.zeros(0, np.float32)
+_NO_COMMAND = padded(np.zeros(0, np.float32))
 
 
 @dataclass(frozen=True)
@@ -60,7 +58,7 @@ def read_plan(path: str | Path, interface: Interface) -> Targets:
 
 
 class Plan:
-    """Answers observations from a plan, as `Policies` does from policies.
+    """Answers queries from a plan, as `Policies` does from policies.
 
     Args:
         targets: the plan.
@@ -73,22 +71,19 @@ class Plan:
         self._start_s: float | None = None
 
     def finish(self) -> tuple[str, ...]:
-        """Has nothing to tell."""
+        """Has nothing to report."""
         return ()
 
-    def answer(self, packet: np.void) -> bytes:
-        """Answers one observation; the plan begins when the policy may run."""
-        target = np.asarray(packet["target"], np.float64)
-        if not packet["runs"]:
+    def answer(self, query: Query) -> Answer:
+        """Answers a query; the plan begins when the policy may run."""
+        target = np.asarray(query.target_rad, np.float64)
+        if not query.runs:
             self._start_s = None
         else:
-            t = float(packet["t_s"])
-            self._start_s = t if self._start_s is None else self._start_s
-            target = toward(target, self._at(t - self._start_s), self._step_rad)
-        tick, challenge = int(packet["tick"]), int(packet["challenge"])
-        return encode_answer(
-            Proposal(tick, complement(challenge), target), _NO_COMMAND, 0
-        )
+            self._start_s = query.t_s if self._start_s is None else self._start_s
+            wanted = self._at(query.t_s - self._start_s)
+            target = toward(target, wanted, self._step_rad)
+        return Answer(propose(query, target), _NO_COMMAND, 0)
 
     def _at(self, elapsed_s: float) -> Array:
         plan = self._plan

@@ -1,4 +1,4 @@
-"""The policy's side of the link: which policy runs, told what.
+"""The policy's side of the link: which policy runs, with which inputs.
 
     operator selects ──► policy ──(recovery, upright)──► settle ramp ──► first policy
         │                  └── a recovery that begins upright: settle ramp at once
@@ -18,17 +18,16 @@ from fingers_deploy.controller import PolicyController
 from fingers_deploy.manifest import Interface
 from fingers_deploy.rotations import gravity
 from fingers_robot.behaviour.command import CommandSource
+from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
 from fingers_robot.behaviour.hand_over import Moment, asked_for, build_history
 from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.settle import Ramp, settle_ramp
-from fingers_robot.behaviour.sources import Sources, Told
+from fingers_robot.behaviour.sources import Sources, SourceSample
 from fingers_robot.behaviour.task_inputs import inputs_of
 from fingers_robot.behaviour.tracker_port import TrackerPort
 from fingers_robot.behaviour.upright import tilt_angle, upright_step
-from fingers_robot.runtime.link import encode_answer
-from fingers_robot.safety.detectors.policy import complement
-from fingers_robot.safety.types import PolicyFault, Proposal
+from fingers_robot.safety.types import PolicyFault
 
 Array = NDArray[np.float64]
 RECOVERY = "recovery"
@@ -39,7 +38,7 @@ middle of a stride may fall over, one that stands does not."""
 
 
 class Policies:
-    """One or more policies and what they are told.
+    """One or more policies and the sources of their inputs.
 
     Args:
         controllers: the policies; the first is the one to which recovery leads.
@@ -86,52 +85,45 @@ class Policies:
         """Lets go of the sources; returns what the operator should know of them."""
         return self.sources.finish()
 
-    def answer(self, packet: np.void) -> bytes:
-        """Answers one observation of the supervisor."""
-        t, target = float(packet["t_s"]), packet["target"]
-        if not packet["runs"]:
-            self._rest(packet)
-        elif int(packet["policy"]) != self._selected:
-            self._select(int(packet["policy"]), target, t)
+    def answer(self, query: Query) -> Answer:
+        """Answers one query of the supervisor."""
+        t, target = query.t_s, query.target_rad
+        if not query.runs:
+            self._rest(query)
+        elif query.policy != self._selected:
+            self._select(query.policy, target, t)
         interface = self._interface(self._active)
-        told = self.sources.hear(packet, interface, self._stood_s < np.inf)
-        inputs = inputs_of(interface, told.given, packet["pos"])
+        sample = self.sources.poll(query, interface, self._stood_s < np.inf)
+        inputs = inputs_of(interface, sample.given, query.joint_pos)
         fault = PolicyFault.NONE
-        if packet["runs"]:
-            self._spare_recovery(packet, target, t)
-        if packet["runs"] and self._ramp is not None:
-            target = self._follow_ramp(self._ramp, packet, told, t)
-        elif packet["runs"] and not told.moves:
+        if query.runs:
+            self._spare_recovery(query, target, t)
+        if query.runs and self._ramp is not None:
+            target = self._follow_ramp(self._ramp, query, sample, t)
+        elif query.runs and not sample.moves:
             self._held = True
-            self._keep(packet, told, np.zeros(len(target)))
-        elif packet["runs"]:
-            target, fault = self._run(packet, told, inputs)
-            self._look_for_upright(packet, target, t)
-        if packet["runs"] and t >= self._stood_s:
+            self._keep(query, sample, np.zeros(len(target)))
+        elif query.runs:
+            target, fault = self._run(query, sample, inputs)
+            self._look_for_upright(query, target, t)
+        if query.runs and t >= self._stood_s:
             # By its own stance, from which the way to the other one is tested.
             self._settle((self._active, self._selected), target, t)
             self._stood_s, self._then = np.inf, self._selected
-        tick, challenge = int(packet["tick"]), int(packet["challenge"])
-        proposal = Proposal(
-            tick,
-            complement(challenge),
-            np.asarray(target, np.float64),
-            told.age_s,
-            fault,
-        )
-        return encode_answer(proposal, inputs, self._active)
+        proposal = propose(query, target, sample.age_s, fault)
+        return Answer(proposal, padded(inputs), self._active)
 
-    def _rest(self, packet: np.void) -> None:
+    def _rest(self, query: Query) -> None:
         """Everything starts afresh at the targets on the wire."""
         self._moments.clear()
         self.sources.rest()
         self._ramp, self._held, self._getting_up = None, False, False
         self._stood_s = self._upright_s = np.inf
-        selected = int(packet["policy"])
+        selected = query.policy
         if 0 <= selected < len(self._controllers):
             self._active = self._selected = selected
-        if np.isfinite(packet["target"]).all():
-            self._controllers[self._active].reset(packet["target"])
+        if np.isfinite(query.target_rad).all():
+            self._controllers[self._active].reset(query.target_rad)
 
     def _select(self, number: int, target: Array, t: float) -> None:
         """Goes to another policy, by a ramp where it stands in another way."""
@@ -173,41 +165,41 @@ class Policies:
         return self._controllers[number].bundle.manifest.interface
 
     def _run(
-        self, packet: np.void, told: Told, inputs: NDArray[np.float32]
+        self, query: Query, sample: SourceSample, inputs: NDArray[np.float32]
     ) -> tuple[Array, PolicyFault]:
         if self._held:
-            self._hand_over(self._active, packet["target"])
+            self._hand_over(self._active, query.target_rad)
         controller = self._controllers[self._active]
-        down = gravity(packet["quat"])
-        step = controller.step(packet["pos"], down, packet["gyro"], inputs)
+        down = gravity(query.quat_w)
+        step = controller.step(query.joint_pos, down, query.gyro_b, inputs)
         target = step.astype(np.float64)
         if controller.faults:
             bad = controller.fault == "non-finite measurement"
             return target, PolicyFault.OBSERVATION if bad else PolicyFault.OUTPUT
         asked = asked_for(controller.action, self._interface(self._active))
-        self._keep(packet, told, asked)
+        self._keep(query, sample, asked)
         return target, PolicyFault.NONE
 
-    def _keep(self, packet: np.void, told: Told, asked_rad: Array) -> None:
-        down = gravity(packet["quat"])
+    def _keep(self, query: Query, sample: SourceSample, asked_rad: Array) -> None:
+        down = gravity(query.quat_w)
         self._moments.append(
-            Moment(packet["pos"], down, packet["gyro"], told.given, asked_rad)
+            Moment(query.joint_pos, down, query.gyro_b, sample.given, asked_rad)
         )
 
-    def _spare_recovery(self, packet: np.void, target: Array, t: float) -> None:
+    def _spare_recovery(self, query: Query, target: Array, t: float) -> None:
         """A hand that stands as a recovery begins is not thrown over: it settles."""
         if not self._recovers() or self._getting_up or self._ramp is not None:
             return
-        since_s, _ = self._upright(np.inf, packet, t)
+        since_s, _ = self._upright(np.inf, query, t)
         self._getting_up = since_s == np.inf
         if not self._getting_up:
             self._end_recovery(target, t)
 
-    def _look_for_upright(self, packet: np.void, target: Array, t: float) -> None:
+    def _look_for_upright(self, query: Query, target: Array, t: float) -> None:
         """Recovery is over once the hand is upright: settle, then the first policy."""
         if not self._recovers():
             return
-        self._upright_s, upright = self._upright(self._upright_s, packet, t)
+        self._upright_s, upright = self._upright(self._upright_s, query, t)
         if upright:
             self._end_recovery(target, t)
 
@@ -215,18 +207,20 @@ class Policies:
         manifest = self._controllers[self._active].bundle.manifest
         return manifest.task == RECOVERY and self._stood_s == np.inf
 
-    def _upright(self, since_s: float, packet: np.void, t: float) -> tuple[float, bool]:
-        tilt = tilt_angle(packet["quat"], self._interface(self._active).v_quat_b)
-        speed = float(np.linalg.norm(packet["gyro"]))
+    def _upright(self, since_s: float, query: Query, t: float) -> tuple[float, bool]:
+        tilt = tilt_angle(query.quat_w, self._interface(self._active).v_quat_b)
+        speed = float(np.linalg.norm(query.gyro_b))
         return upright_step(since_s, tilt, speed, t)
 
     def _end_recovery(self, target: Array, t: float) -> None:
         self._settle((0,), target, t)
         self._then = 0 if self._active != 0 else None
 
-    def _follow_ramp(self, ramp: Ramp, packet: np.void, told: Told, t: float) -> Array:
+    def _follow_ramp(
+        self, ramp: Ramp, query: Query, sample: SourceSample, t: float
+    ) -> Array:
         target = ramp.target(t)
-        self._keep(packet, told, target - packet["target"])
+        self._keep(query, sample, target - query.target_rad)
         if ramp.over(t) and self._stances:
             self._settle(self._stances, target, t)
         elif ramp.over(t) and self._then is not None:

@@ -1,4 +1,4 @@
-"""Everything that tells a policy what to do: gamepad, heading, keys, camera."""
+"""Where the inputs of a policy come from: gamepad, heading, keys, camera."""
 
 from dataclasses import dataclass
 
@@ -15,6 +15,7 @@ from fingers_robot.behaviour.command import (
     command_step,
     rest_command,
 )
+from fingers_robot.behaviour.exchange import Query
 from fingers_robot.behaviour.heading import HeadingConfig, heading_step
 from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, Given, reads, resized
@@ -25,14 +26,14 @@ _YAW = 2  # entry of the crawl command
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
-    """What the sources told in one control step.
+class SourceSample:
+    """What the sources delivered in one control step.
 
     Attributes:
         given: inputs by name of the term.
         age_s: age of what the policy depends on: gamepad, camera [s].
         moves: the policy may move the targets. A policy that reads no command cannot
-            be told to stand still: it is held while the dead-man button is not, and
+            stand still by command: it is held while the dead-man button is not, and
             while the camera is silent.
     """
 
@@ -76,51 +77,51 @@ class Sources:
             self.tracker.close()
         return tuple(line for line in said if line)
 
-    def hear(
-        self, packet: np.void, interface: Interface, at_rest: bool = False
-    ) -> Told:
-        """Asks every source.
+    def poll(
+        self, query: Query, interface: Interface, at_rest: bool = False
+    ) -> SourceSample:
+        """Reads every source.
 
         Args:
-            packet: from the supervisor.
+            query: of the supervisor.
             interface: of the policy that runs.
             at_rest: whatever the operator asks for, as if the dead-man button were not
                 held.
         """
-        t = float(packet["t_s"])
+        t = query.t_s
         frame = self.command.poll(t)
         age_s = float("inf") if frame is None else t - frame.t_s
         held = frame is not None and frame.deadman and age_s <= FRESH_S
         if at_rest:
             frame, held = None, False
         given: dict[str, NDArray] = {
-            "command": self._commanded(packet, interface, frame, held, t)
+            "command": self._commanded(query, interface, frame, held, t)
         }
         presses = reads(interface, ("request",))
-        if int(packet["key"]):
-            self.keys.ask(int(packet["key"]) - 1)
-        may_ask = bool(packet["runs"]) and presses and held
+        if query.key:
+            self.keys.ask(query.key - 1)
+        may_ask = query.runs and presses and held
         given["request"] = self.keys.step(t, may_ask)
         if presses and self.keys.lost:
             age_s = float("inf")
-        seen_s = self._see(packet, given, t)
+        seen_s = self._see(query, given, t)
         if not reads(interface, OBJECT_TERMS):
-            return Told(given, age_s, moves=True)
+            return SourceSample(given, age_s, moves=True)
         moves = held and seen_s <= FRESH_S
-        return Told(given, max(age_s, seen_s), moves)
+        return SourceSample(given, max(age_s, seen_s), moves)
 
-    def _see(self, packet: np.void, given: dict[str, NDArray], t: float) -> float:
-        """Adds what the camera tells; returns its age [s], without one infinite."""
+    def _see(self, query: Query, given: dict[str, NDArray], t: float) -> float:
+        """Adds what the camera sees; returns its age [s], without one infinite."""
         if self.tracker is None:
             return float("inf")
         age_s = self.tracker.poll(t)
-        seen = self.tracker.inputs(gravity(packet["quat"]))
+        seen = self.tracker.inputs(gravity(query.quat_w))
         given |= dict(zip(OBJECT_TERMS, seen.reshape(3, 3), strict=True))
         return age_s
 
     def _commanded(
         self,
-        packet: np.void,
+        query: Query,
         interface: Interface,
         frame: Frame | None,
         held: bool,
@@ -135,7 +136,7 @@ class Sources:
         command = self._state.value.astype(np.float32)
         if self._hold is None or len(ranges) != _YAW + 1:
             return command
-        quat = packet["quat"]
+        quat = query.quat_w
         if not held or not np.isfinite(quat).all():
             # Nobody lets the hand turn: the heading at the next time is held then.
             self._reference = None

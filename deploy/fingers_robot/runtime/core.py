@@ -1,4 +1,4 @@
-"""One step of the supervisor's process: read, judge, write, tell the policy, record."""
+"""One step of the supervisor's process: read, judge, write, ask the policy, record."""
 
 import time
 from collections import deque
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_deploy.rotations import gravity
+from fingers_robot.behaviour.exchange import COMMANDS, Answer, Query
 from fingers_robot.drivers.protocol import Driver
 from fingers_robot.reading import Health, ImuReading, Reading
 from fingers_robot.record.row import empty_row
-from fingers_robot.runtime.link import COMMANDS, OBSERVATION, Answer
 from fingers_robot.runtime.preflight import Check, preflight
 from fingers_robot.runtime.stats import LoopStats
 from fingers_robot.runtime.ticker import Tick
@@ -24,6 +24,7 @@ from fingers_robot.safety.machine import initial_state, step
 from fingers_robot.safety.types import Inputs, Mode, Operator, Outputs
 
 Sample = tuple[Reading | None, ImuReading | None, Health | None, str]
+_UNKNOWN = np.full(JOINT_COUNT, np.nan)
 
 
 class Link(Protocol):
@@ -31,8 +32,8 @@ class Link(Protocol):
 
     open: bool
 
-    def send(self, observation: np.ndarray) -> None:
-        """Sends an observation; never blocks."""
+    def send(self, query: Query) -> None:
+        """Sends a query; never blocks."""
         ...
 
     def poll(self) -> Answer | None:
@@ -88,9 +89,8 @@ class Core:
         self.stats = LoopStats()
         self.checks: tuple[Check, ...] = ()
         self.selected = 0
-        self.keys: deque[int] = (
-            deque()
-        )  # that the operator asks for, the next one first
+        self.keys: deque[int] = deque()
+        """That the operator asks for, the next one first."""
         self._write_error = ""
         self._sent: dict[int, float] = {}
         self._row = empty_row()
@@ -134,7 +134,7 @@ class Core:
         self._apply(out)
         if control >= 0:
             late_s = self._late(control, tick)
-            self._tell(control, inputs, out, t)
+            self._ask(control, inputs, out, t)
             self._record(control, late_s, inputs, t)
             self.stats.step(late_s, skipped, late_s + self._now() - t)
         if self._sink is not None:
@@ -204,18 +204,22 @@ class Core:
         except Exception as error:
             self._write_error = f"{type(error).__name__}: {error}"
 
-    def _tell(self, control: int, inputs: Inputs, out: Outputs, t: float) -> None:
+    def _ask(self, control: int, inputs: Inputs, out: Outputs, t: float) -> None:
         reading, imu = inputs.reading, inputs.imu
-        packet = np.zeros((), OBSERVATION)
-        packet["challenge"], packet["tick"], packet["t_s"] = out.challenge, control, t
-        packet["pos"] = np.nan if reading is None else reading.pos_rad
-        packet["quat"] = np.nan if imu is None else imu.quat_w
-        packet["gyro"] = np.nan if imu is None else imu.gyro_b
-        packet["target"] = self.state.target_rad
-        packet["runs"], packet["policy"] = out.policy_runs, self.selected
-        packet["key"] = self.keys.popleft() + 1 if self.keys else 0
+        query = Query(
+            tick=control,
+            t_s=t,
+            joint_pos=_UNKNOWN if reading is None else reading.pos_rad,
+            quat_w=_UNKNOWN[:4] if imu is None else imu.quat_w,
+            gyro_b=_UNKNOWN[:3] if imu is None else imu.gyro_b,
+            target_rad=self.state.target_rad,
+            runs=out.policy_runs,
+            policy=self.selected,
+            key=self.keys.popleft() + 1 if self.keys else 0,
+            challenge=out.challenge,
+        )
         self._sent = {control: t}
-        self._link.send(packet)
+        self._link.send(query)
 
     def _record(self, control: int, late_s: float, inputs: Inputs, t: float) -> None:
         if self._sink is None:
@@ -246,8 +250,7 @@ class Core:
 
 def _joints(reading: Reading | None) -> tuple[NDArray, NDArray]:
     if reading is None:
-        unknown = np.full(JOINT_COUNT, np.nan)
-        return unknown, unknown
+        return _UNKNOWN, _UNKNOWN
     return reading.pos_rad, reading.effort_a
 
 

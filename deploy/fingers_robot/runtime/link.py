@@ -1,17 +1,16 @@
 """The link between supervisor and policy: one packet each way per control step."""
 
+import select
 import socket
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT
+from fingers_robot.behaviour.exchange import COMMANDS, Answer, Query
 from fingers_robot.safety.types import PolicyFault, Proposal
 
-Array = NDArray[np.float64]
-COMMANDS = 9  # most task inputs of any task
 _AT_ONCE = 16  # answers that one step of the loop takes
+_ALL = 1 << 30
 
 OBSERVATION = np.dtype(
     [
@@ -27,9 +26,7 @@ OBSERVATION = np.dtype(
         ("key", "<i4"),
     ]
 )
-"""Supervisor to policy: measurements, targets on the wire, whether the policy runs, and
-which policy the operator has selected; `key` is one more than the place of a key that
-the operator asks for now, 0 for none."""
+"""Supervisor to policy: the fields of `Query`."""
 
 ANSWER = np.dtype(
     [
@@ -45,21 +42,6 @@ ANSWER = np.dtype(
 )
 """Policy to supervisor: the answer to one observation; `joints` says how many targets
 there are."""
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """A proposal, with what the log tells about it.
-
-    Attributes:
-        proposal: for the supervisor.
-        command: task inputs that the policy saw, filled up with NaN, [9].
-        policy: number of the policy that made it.
-    """
-
-    proposal: Proposal
-    command: NDArray[np.float32]
-    policy: int
 
 
 def make_link() -> tuple[socket.socket, socket.socket]:
@@ -79,34 +61,109 @@ class SupervisorEnd:
         end.setblocking(False)
         self.open = True
 
-    def send(self, observation: np.ndarray) -> None:
-        """Sends an observation; one that the policy has no room for is lost."""
-        try:
-            self._socket.send(observation.tobytes())
-        except BlockingIOError:
-            return
-        except OSError:
-            self.open = False
+    def send(self, query: Query) -> None:
+        """Sends a query; one that the policy has no room for is lost."""
+        self.open = _send(self._socket, encode_query(query)) and self.open
 
     def poll(self) -> Answer | None:
         """Returns the newest answer since the last call.
 
         A policy that floods the link is read bit by bit: it may not hold up the loop.
         """
-        newest = None
-        for _ in range(_AT_ONCE):
-            try:
-                data = self._socket.recv(ANSWER.itemsize)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
-            if len(data) != ANSWER.itemsize:
-                # Nothing means that the other end is closed; half an answer is none.
-                self.open = self.open and len(data) > 0
-                break
-            newest = data
-        return None if newest is None else decode_answer(newest)
+        newest, there = _newest(self._socket, ANSWER.itemsize, _AT_ONCE)
+        self.open = self.open and there
+        return decode_answer(newest) if newest else None
+
+
+class PolicyEnd:
+    """The policy's end.
+
+    Args:
+        end: the socket.
+    """
+
+    def __init__(self, end: socket.socket):
+        self._socket = end
+        end.setblocking(False)
+        self.open = True
+
+    def wait(self, seconds: float) -> Query | None:
+        """Returns the newest query once one has come; None after some time [s]."""
+        select.select([self._socket], [], [], seconds)
+        newest, self.open = _newest(self._socket, OBSERVATION.itemsize, _ALL)
+        return decode_query(newest) if newest else None
+
+    def send(self, answer: Answer) -> None:
+        """Sends an answer; a supervisor that does not read will miss its lease."""
+        self.open = _send(self._socket, encode_answer(answer)) and self.open
+
+
+def _send(end: socket.socket, data: bytes) -> bool:
+    """Sends a packet if there is room; returns whether the other end is there."""
+    try:
+        end.send(data)
+    except BlockingIOError:
+        return True
+    except OSError:
+        return False
+    return True
+
+
+def _newest(end: socket.socket, size: int, most: int) -> tuple[bytes, bool]:
+    """Newest of at most `most` waiting packets, and whether the other end is there."""
+    newest = b""
+    for _ in range(most):
+        try:
+            data = end.recv(size)
+        except BlockingIOError:
+            break
+        except OSError:
+            data = b""
+        if len(data) != size:
+            # Nothing means that the other end is closed; half a packet is none.
+            return newest, len(data) > 0
+        newest = data
+    return newest, True
+
+
+def encode_query(query: Query) -> bytes:
+    """Packs a query."""
+    packet = np.zeros((), OBSERVATION)
+    packet["challenge"], packet["tick"] = query.challenge, query.tick
+    packet["t_s"], packet["pos"] = query.t_s, query.joint_pos
+    packet["quat"], packet["gyro"] = query.quat_w, query.gyro_b
+    packet["target"], packet["runs"] = query.target_rad, query.runs
+    packet["policy"], packet["key"] = query.policy, query.key
+    return packet.tobytes()
+
+
+def decode_query(data: bytes) -> Query:
+    """Unpacks a query."""
+    packet = np.frombuffer(data, OBSERVATION)[0]
+    return Query(
+        tick=int(packet["tick"]),
+        t_s=float(packet["t_s"]),
+        joint_pos=packet["pos"],
+        quat_w=packet["quat"],
+        gyro_b=packet["gyro"],
+        target_rad=packet["target"],
+        runs=bool(packet["runs"]),
+        policy=int(packet["policy"]),
+        key=int(packet["key"]),
+        challenge=int(packet["challenge"]),
+    )
+
+
+def encode_answer(answer: Answer) -> bytes:
+    """Packs an answer."""
+    proposal, packet = answer.proposal, np.zeros((), ANSWER)
+    packet["response"], packet["tick"] = proposal.response, proposal.tick
+    count = len(proposal.target_rad)
+    packet["target"][:count] = proposal.target_rad
+    packet["joints"], packet["fault"] = count, proposal.fault
+    packet["command"], packet["policy"] = answer.command, answer.policy
+    packet["command_age_s"] = proposal.command_age_s
+    return packet.tobytes()
 
 
 def decode_answer(data: bytes) -> Answer:
@@ -124,18 +181,3 @@ def decode_answer(data: bytes) -> Answer:
         fault=PolicyFault(fault) if known else PolicyFault.OUTPUT,
     )
     return Answer(proposal, packet["command"], int(packet["policy"]))
-
-
-def encode_answer(
-    proposal: Proposal, command: NDArray[np.float32], policy: int
-) -> bytes:
-    """Packs an answer; `command` [n] may be shorter than nine."""
-    packet = np.zeros((), ANSWER)
-    packet["response"], packet["tick"] = proposal.response, proposal.tick
-    count = len(proposal.target_rad)
-    packet["target"][:count] = proposal.target_rad
-    packet["joints"], packet["fault"] = count, proposal.fault
-    packet["command"] = np.nan
-    packet["command"][: len(command)] = command
-    packet["command_age_s"], packet["policy"] = proposal.command_age_s, policy
-    return packet.tobytes()

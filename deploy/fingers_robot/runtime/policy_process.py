@@ -1,14 +1,11 @@
-"""The policy's process: observations in, proposals out, nothing else."""
+"""The policy's process: queries in, answers out, nothing else."""
 
 import contextlib
 import json
-import select
 import socket
 import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
-
-import numpy as np
 
 from fingers_deploy.bundle import load_bundle
 from fingers_deploy.controller import PolicyController
@@ -23,7 +20,7 @@ from fingers_robot.behaviour.plan import Plan, read_plan
 from fingers_robot.behaviour.policies import Policies
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, reads
 from fingers_robot.behaviour.tracker_port import TrackerPort
-from fingers_robot.runtime.link import OBSERVATION
+from fingers_robot.runtime.link import PolicyEnd
 from fingers_robot.runtime.realtime import PRIORITY, prefer_this_process
 from fingers_robot.runtime.signals import ignore_interrupts
 
@@ -78,29 +75,12 @@ def _tracker(
 
 
 def serve(link: socket.socket, policies: Policies | Plan) -> None:
-    """Answers the newest observation until the supervisor goes away."""
-    link.setblocking(False)
-    while True:
-        select.select([link], [], [], _IDLE_S)
-        newest = b""
-        while True:
-            try:
-                data = link.recv(OBSERVATION.itemsize)
-            except BlockingIOError:
-                break
-            except OSError:
-                return
-            if len(data) != OBSERVATION.itemsize:
-                return
-            newest = data
-        if newest:
-            answer = policies.answer(np.frombuffer(newest, OBSERVATION)[0])
-            try:
-                link.send(answer)
-            except BlockingIOError:
-                continue  # the supervisor does not read: it will miss the lease
-            except OSError:
-                return
+    """Answers the newest query until the supervisor goes away."""
+    end = PolicyEnd(link)
+    while end.open:
+        query = end.wait(_IDLE_S)
+        if query is not None:
+            end.send(policies.answer(query))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -8,6 +8,7 @@ import pytest
 from fingers_deploy import PolicyController
 from fingers_deploy.rotations import conjugate, gravity
 from fingers_robot.behaviour.command import FixedCommand
+from fingers_robot.behaviour.exchange import Query
 from fingers_robot.behaviour.hand_over import (
     Moment,
     action_for,
@@ -16,7 +17,6 @@ from fingers_robot.behaviour.hand_over import (
 )
 from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.policies import Policies
-from fingers_robot.runtime.link import OBSERVATION, decode_answer
 from fingers_robot.safety import PolicyFault
 
 SEED = 17
@@ -46,12 +46,18 @@ class Runner:
         self.quat, self.gyro = conjugate(self.interface.v_quat_b), np.zeros(3)
 
     def step(self, policy=0, runs=True):
-        packet = np.zeros((), OBSERVATION)
-        packet["tick"], packet["t_s"], packet["challenge"] = self.k, 0.02 * self.k, 5
-        packet["pos"], packet["quat"] = self.pos, self.quat
-        packet["gyro"] = self.gyro + 0.1 * self.rng.standard_normal(3)
-        packet["target"], packet["runs"], packet["policy"] = self.target, runs, policy
-        answer = decode_answer(self.policies.answer(packet[()]))
+        query = Query(
+            tick=self.k,
+            t_s=0.02 * self.k,
+            challenge=5,
+            joint_pos=self.pos,
+            quat_w=self.quat,
+            gyro_b=self.gyro + 0.1 * self.rng.standard_normal(3),
+            target_rad=self.target,
+            runs=runs,
+            policy=policy,
+        )
+        answer = self.policies.answer(query)
         self.k += 1
         self.last = self.target
         self.target = answer.proposal.target_rad.copy()
@@ -149,14 +155,14 @@ def test_while_it_does_not_run_a_policy_proposes_the_targets_on_the_wire(bundle)
     assert runner.policies._controllers[0].observation is not None
 
 
-def test_a_bad_measurement_is_told(bundle):
+def test_a_bad_measurement_is_reported(bundle):
     runner = Runner([bundle])
     runner.step()
     runner.pos = np.full(20, np.nan)
     assert runner.step().proposal.fault == PolicyFault.OBSERVATION
 
 
-def test_a_network_that_breaks_is_told(bundle):
+def test_a_network_that_breaks_is_reported(bundle):
     runner = Runner([bundle])
     runner.step()
     runner.policies._controllers[0]._policy = lambda obs: np.full(20, np.nan)

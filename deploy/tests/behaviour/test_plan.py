@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from fingers_deploy.errors import InputError
+from fingers_robot.behaviour.exchange import Query
 from fingers_robot.behaviour.plan import Plan, read_plan
-from fingers_robot.runtime.link import OBSERVATION, decode_answer
 
 
 def _write(path, interface, header=None, rows=None):
@@ -20,10 +20,8 @@ def test_a_plan_is_played_within_the_step_of_the_policy(interface, tmp_path):
     plan = Plan(read_plan(path, interface), interface)
     target, reached = np.asarray(interface.initial_target_rad, float), []
     for k in range(120):
-        packet = np.zeros((), OBSERVATION)
-        packet["t_s"], packet["target"], packet["runs"] = 0.02 * k, target, k >= 10
-        packet["tick"] = k
-        proposal = decode_answer(plan.answer(packet[()])).proposal
+        query = Query(k, 0.02 * k, target, np.ones(4), np.zeros(3), target, k >= 10)
+        proposal = plan.answer(query).proposal
         assert np.abs(proposal.target_rad - target).max() <= 0.06 + 1e-9
         if k < 10:
             np.testing.assert_array_equal(proposal.target_rad, target)

@@ -12,12 +12,12 @@ from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.manifest import Observation, Term
 from fingers_deploy.rotations import conjugate, multiply
 from fingers_robot.behaviour.command import FixedCommand, Frame
+from fingers_robot.behaviour.exchange import Query
 from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.keys import ARROWS
 from fingers_robot.behaviour.policies import STAND_S, Policies
 from fingers_robot.behaviour.tracker_port import TrackerPort
-from fingers_robot.runtime.link import OBSERVATION, decode_answer
 
 INPUTS = {
     "keyboard": (
@@ -87,12 +87,18 @@ class Run:
         self.quat, self.moved = conjugate(self.interface.v_quat_b), 0.0
 
     def step(self, policy=0, runs=True, key=0):
-        packet = np.zeros((), OBSERVATION)
-        packet["tick"], packet["t_s"] = self.k, 50.0 + 0.02 * self.k
-        packet["pos"], packet["quat"] = self.pos, self.quat
-        packet["target"], packet["runs"], packet["policy"] = self.target, runs, policy
-        packet["key"] = key
-        answer = decode_answer(self.policies.answer(packet[()]))
+        query = Query(
+            tick=self.k,
+            t_s=50.0 + 0.02 * self.k,
+            joint_pos=self.pos,
+            quat_w=self.quat,
+            gyro_b=np.zeros(3),
+            target_rad=self.target,
+            runs=runs,
+            policy=policy,
+            key=key,
+        )
+        answer = self.policies.answer(query)
         self.k += 1
         self.seen = self.pos
         self.moved = np.abs(answer.proposal.target_rad - self.target).max()
@@ -130,7 +136,7 @@ def test_without_the_dead_man_no_key_is_asked_for(bundles):
     assert any(run.step().command[:4].any() for _ in range(60))
 
 
-def test_a_gamepad_or_keyboard_that_is_lost_is_told_to_the_supervisor(bundles):
+def test_a_gamepad_or_keyboard_that_is_lost_is_reported_to_the_supervisor(bundles):
     class Gone:
         lost = True
 
@@ -160,7 +166,7 @@ def camera(tmp_path, bundles):
     port.close()
 
 
-def test_a_push_policy_reads_what_the_camera_tells(bundles, camera):
+def test_a_push_policy_reads_what_the_camera_sees(bundles, camera):
     port, sees = camera
     run = Run(bundles, "push", tracker=port)
     for k in range(20):
@@ -271,7 +277,7 @@ def test_between_tasks_in_one_stance_nothing_waits(bundles, camera):
         assert answer.policy == k // 20 % 2
         assert run.moved <= 0.06 + 1e-6
         if k == 20:
-            # While crawling the camera told as well: the history knows of it.
+            # While crawling the camera sent samples as well: the history knows of it.
             seen = run.observation[8 * 46 : 8 * 49].reshape(8, 3)
             assert seen.all()
 

@@ -9,15 +9,15 @@ import pytest
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.rotations import conjugate
+from fingers_robot.behaviour.exchange import Answer, propose
 from fingers_robot.drivers.open import open_driver
 from fingers_robot.drivers.wuji import WujiDriver
 from fingers_robot.reading import ImuReading
 from fingers_robot.runtime.core import Core
 from fingers_robot.runtime.guard import guard_hand, make_safe
 from fingers_robot.runtime.ticker import Ticker
-from fingers_robot.safety import Mode, Operator, Proposal, make_limits
+from fingers_robot.safety import Mode, Operator, make_limits
 from fingers_robot.safety.detectors.health import unhealthy
-from fingers_robot.safety.detectors.policy import complement
 
 
 class StillImu:
@@ -222,12 +222,8 @@ class EchoLink:
     def __init__(self):
         self.answer = None
 
-    def send(self, packet):
-        from fingers_robot.runtime.link import Answer
-
-        proposal = Proposal(
-            int(packet["tick"]), complement(int(packet["challenge"])), packet["target"]
-        )
+    def send(self, query):
+        proposal = propose(query, query.target_rad)
         self.answer = Answer(proposal, np.zeros(9, np.float32), 0)
 
     def poll(self):

@@ -1,3 +1,4 @@
+import dataclasses
 import os
 import signal
 import socket
@@ -7,13 +8,14 @@ import sys
 import numpy as np
 import pytest
 
+from fingers_robot.behaviour.exchange import Answer, Query, padded
 from fingers_robot.drivers.open import _OPENERS
 from fingers_robot.runtime.console import ConsoleLink
 from fingers_robot.runtime.guard import guard_hand
 from fingers_robot.runtime.launcher import notify
 from fingers_robot.runtime.link import (
     ANSWER,
-    OBSERVATION,
+    PolicyEnd,
     SupervisorEnd,
     decode_answer,
     encode_answer,
@@ -22,6 +24,23 @@ from fingers_robot.runtime.link import (
 from fingers_robot.runtime.stats import LoopStats, Timing
 from fingers_robot.runtime.ticker import Ticker
 from fingers_robot.safety import Operator, PolicyFault, Proposal
+
+QUERY = Query(
+    tick=7,
+    t_s=3.5,
+    joint_pos=np.arange(20.0),
+    quat_w=np.array([1.0, 0.0, 0.0, np.nan]),
+    gyro_b=np.array([0.1, 0.2, 0.3]),
+    target_rad=np.arange(20.0) / 7,
+    runs=True,
+    policy=1,
+    key=3,
+    challenge=2**63 + 5,
+)
+
+
+def answered(proposal, inputs=(), policy=0):
+    return Answer(proposal, padded(np.array(inputs, np.float32)), policy)
 
 
 class Fake:
@@ -120,23 +139,38 @@ def test_link_carries_answers_and_keeps_the_newest():
     assert end.poll() is None and end.open
     for tick in (1, 2):
         proposal = Proposal(tick, tick + 7, np.arange(20.0) + tick, 0.25)
-        right.send(encode_answer(proposal, np.array([0.1, 0.2], np.float32), 1))
+        right.send(encode_answer(answered(proposal, (0.1, 0.2), 1)))
     answer = end.poll()
     assert (answer.proposal.tick, answer.proposal.response, answer.policy) == (2, 9, 1)
     np.testing.assert_array_equal(answer.proposal.target_rad, np.arange(20.0) + 2)
     assert answer.proposal.command_age_s == 0.25
+    np.testing.assert_array_equal(answer.command, answered(None, (0.1, 0.2)).command)
     right.close()
     assert end.poll() is None and not end.open
 
 
+def test_link_carries_queries_and_keeps_the_newest():
+    left, right = make_link()
+    supervisor, policy = SupervisorEnd(left), PolicyEnd(right)
+    assert policy.wait(0.0) is None and policy.open
+    supervisor.send(dataclasses.replace(QUERY, tick=6))
+    supervisor.send(QUERY)
+    found = policy.wait(0.0)
+    for field in dataclasses.fields(Query):
+        wanted = getattr(QUERY, field.name)
+        np.testing.assert_array_equal(getattr(found, field.name), wanted)
+    left.close()
+    assert policy.wait(0.0) is None and not policy.open
+
+
 def test_a_link_that_nobody_reads_blocks_nothing():
     left, right = make_link()
-    end, packet = SupervisorEnd(left), np.zeros((), OBSERVATION)
+    end = SupervisorEnd(left)
     for _ in range(5000):
-        end.send(packet)
+        end.send(QUERY)
     assert end.open
     right.close()
-    end.send(packet)
+    end.send(QUERY)
     assert not end.open
 
 
@@ -144,7 +178,7 @@ def test_a_policy_that_floods_the_link_does_not_hold_up_the_loop():
     left, right = make_link()
     end = SupervisorEnd(left)
     for tick in range(100):
-        right.send(encode_answer(Proposal(tick, 0, np.zeros(20)), np.zeros(0), 0))
+        right.send(encode_answer(answered(Proposal(tick, 0, np.zeros(20)))))
     ticks = []
     while (answer := end.poll()) is not None:
         ticks.append(answer.proposal.tick)
@@ -163,7 +197,7 @@ def test_half_an_answer_and_noise_are_no_proposal():
 
 
 def test_partial_answers_keep_their_length():
-    data = encode_answer(Proposal(1, 2, np.zeros(7)), np.zeros(0, np.float32), 0)
+    data = encode_answer(answered(Proposal(1, 2, np.zeros(7))))
     assert decode_answer(data).proposal.target_rad.shape == (7,)
 
 
@@ -190,7 +224,7 @@ def test_a_stop_outlasts_what_is_typed_after_it(later):
 
 
 def test_an_impossible_number_of_joints_is_none():
-    data = bytearray(encode_answer(Proposal(1, 2, np.zeros(20)), np.zeros(0), 0))
+    data = bytearray(encode_answer(answered(Proposal(1, 2, np.zeros(20)))))
     place = ANSWER.fields["joints"][1]
     for joints in (21, 25, -1, 2**31 - 1):
         data[place : place + 4] = joints.to_bytes(4, "little", signed=True)

@@ -15,11 +15,10 @@ from fingers_deploy.rotations import gravity
 from fingers_mjx.cli import play as cli_play
 from fingers_mjx.cli.main import main
 from fingers_mjx.evaluation.source import as_deployed, nominal
-from fingers_mjx.play.behaviours import Behaviours, sticks_for
+from fingers_mjx.play.behaviours import Behaviours, orientation_of, sticks_for
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.recovery import RecoveryPlayer, check_chain, story
-from fingers_mjx.play.upright import orientation_of
 from fingers_mjx.runs.setup import make_env, new_setup
 from fingers_robot.behaviour.command import stick_command
 
