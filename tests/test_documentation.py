@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from fingers_mjx.cli.arguments import UsageError, make_parser
+from fingers_mjx.cli.main import UsageError, make_parser
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(

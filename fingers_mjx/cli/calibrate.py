@@ -1,22 +1,48 @@
-"""`fingers sysid calibrate`."""
+"""`fingers sysid calibrate`: Table I of the paper from records on a stand."""
+
+from __future__ import annotations
 
 import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from envs.config.typed import load_yaml
-from envs.hand.hand_file import save_hand_file
-from fingers_mjx.cli.excite import mechanism_of
-from sysid.calibration.calibrate import Calibration, calibrate, calibrated_hand
-from sysid.calibration.figures import write_figures
-from sysid.logs.bag import BagMap
-from sysid.logs.read import read_log
+from fingers_mjx.cli.options import add_command, add_path
+from fingers_mjx.cli.records import (
+    add_mechanism,
+    add_records,
+    mechanism_of,
+    records_of,
+)
+
+if TYPE_CHECKING:
+    from sysid.calibration.calibrate import Calibration
+
+
+def add(actions) -> None:
+    """Adds the action and its arguments."""
+    parser = add_command(
+        actions,
+        "calibrate",
+        run,
+        "measure stiffness, delay, cutoff, speed and tip friction",
+        "Fits Table I to records of a hand on a stand: stiffness, delay, cutoff and "
+        "speed of every joint that moves, and the friction of fingertips from loaded "
+        "pulls (logs with a setting normal_n and a column force.<finger>). Writes "
+        "hand.yaml, calibration.json and pictures.",
+    )
+    add_records(parser, "logs", nargs="+")
+    add_mechanism(parser)
+    add_path(parser, "-o", "--out", metavar="DIR", default=Path("calibration"))
 
 
 def run(args: argparse.Namespace) -> int:
     """Calibrates and writes what was found."""
+    from envs.hand.hand_file import save_hand_file
+    from sysid.calibration.calibrate import calibrate, calibrated_hand
+    from sysid.calibration.figures import write_figures
+
     mechanism = mechanism_of(args)
-    bag_map = load_yaml(BagMap, args.map) if args.map else None
-    logs = [read_log(path, bag_map) for path in args.logs]
-    found = calibrate(logs, mechanism, tell=print)
+    found = calibrate(records_of(args.logs, args.map), mechanism, tell=print)
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "calibration.json").write_text(found.to_json(), encoding="utf-8")
     write_figures(found, args.out)

@@ -3,18 +3,39 @@
 import argparse
 import sys
 from functools import partial
+from pathlib import Path
 
-from fingers_mjx.cli.output import counting
-from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.demo.demo import POLICY_DIR, demo
-from fingers_mjx.demo.screen import Screen
-from fingers_mjx.training.progress import reporter
+from fingers_mjx.cli.options import add_command, add_path, check_directory
+
+
+def add(commands) -> None:
+    """Adds the command and its arguments."""
+    parser = add_command(
+        commands,
+        "demo",
+        run,
+        "see everything once, in minutes, without a GPU",
+        "See everything once, in minutes, without a GPU. Evaluates and plays the "
+        "committed policy, trains a small one, exports it, and writes one "
+        "report.html.",
+    )
+    add_path(parser, "--out", metavar="DIR", default=Path("demo"))
+    add_path(
+        parser,
+        "--policy",
+        metavar="BUNDLE",
+        help="bundle to evaluate and play; default: the committed crawl policy",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Runs the demonstration; progress and the place of the report go to stdout."""
+    from fingers_mjx.cli.output import counting
+    from fingers_mjx.demo.demo import POLICY_DIR, demo
+    from fingers_mjx.demo.screen import Screen
+    from fingers_mjx.training.progress import reporter
+
     check_directory("--out", args.out)
-    policy = args.policy or POLICY_DIR
     screen = Screen(
         say=partial(print, flush=True),
         counting=partial(counting, sys.stdout),
@@ -22,6 +43,5 @@ def run(args: argparse.Namespace) -> int:
     )
     command = f"fingers demo --out {args.out}"
     command += f" --policy {args.policy}" if args.policy else ""
-    report = demo(args.out, policy, screen, [command])
-    print(f"report: {report}")
+    print(f"report: {demo(args.out, args.policy or POLICY_DIR, screen, [command])}")
     return 0

@@ -1,57 +1,96 @@
 """`fingers eval`: many randomized episodes of one policy, measured."""
 
+from __future__ import annotations
+
 import argparse
 import dataclasses
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError
-from envs.physics import default_backend
-from fingers_mjx.cli.output import counting
-from fingers_mjx.cli.paths import check_directory, check_file
-from fingers_mjx.cli.table import print_measures
-from fingers_mjx.cli.train import check_backend
-from fingers_mjx.evaluation.files import write_summary
-from fingers_mjx.evaluation.source import (
-    as_deployed,
-    check_policy_settings,
-    document,
-    evaluate_source,
-    nominal,
-    with_command,
-    write_evaluation,
+from fingers_mjx.cli.options import (
+    POLICY_HELP,
+    add_backend,
+    add_command,
+    add_episodes,
+    add_fixed_command,
+    add_path,
+    add_seed,
+    add_settings,
+    backend_of,
+    check_directory,
+    check_file,
+    whole,
 )
-from fingers_mjx.policy.source import is_run, load_source
-from fingers_mjx.runs.setup import Setup, overridden
+
+if TYPE_CHECKING:
+    from fingers_mjx.runs.setup import Setup
+
+
+def add(commands) -> None:
+    """Adds the command and its arguments."""
+    parser = add_command(
+        commands,
+        "eval",
+        run,
+        "measure a policy in many randomized episodes",
+        "Measure a policy in many randomized episodes. Prints the paper's measures; "
+        "for a run directory, writes summary, table of episodes and figures to "
+        "RUN/eval unless --out says otherwise.",
+    )
+    add_path(parser, "policy", metavar="POLICY", help=POLICY_HELP)
+    add_episodes(parser, 256)
+    add_seed(parser)
+    parser.add_argument(
+        "--steps",
+        type=whole(1),
+        metavar="N",
+        help="control steps of an episode; default: as in training",
+    )
+    add_fixed_command(parser, "m/s, m/s, rad/s in V, for all of every episode")
+    add_backend(parser)
+    parser.add_argument(
+        "--nominal", action="store_true", help="the nominal hand, without noise"
+    )
+    add_settings(parser, "a setting of the task such as env.episode_s=10")
+    add_path(parser, "--json", help="summary to write")
+    what = "summary, table and figures go here"
+    add_path(parser, "--out", metavar="DIR", help=what)
 
 
 def run(args: argparse.Namespace) -> int:
     """Evaluates; the table goes to stdout, progress to stderr."""
-    backend = check_backend(args.backend or default_backend())
+    from fingers_mjx.cli.output import counting, keep_summary, print_measures
+    from fingers_mjx.evaluation import source as evaluation
+    from fingers_mjx.policy.source import is_run, load_source
+
+    backend = backend_of(args)
     if len(args.commands or ()) > 1:
         raise InputError("--command", "", f"{len(args.commands)} commands", "one")
-    check_policy_settings(args.settings)
+    evaluation.check_policy_settings(args.settings)
     check_file("--json", args.json)
     check_directory("--out", args.out)
     loaded = load_source(args.policy)
     source = dataclasses.replace(loaded, setup=_setup(args, loaded.setup))
     with counting(sys.stderr, "evaluating", "steps") as progress:
-        table = evaluate_source(
+        table = evaluation.evaluate_source(
             source, args.episodes, args.seed, backend, args.steps, progress
         )
-    summary = document(source, table, args.seed, _conditions(args, backend))
+    conditions = _conditions(args, backend)
+    summary = evaluation.document(source, table, args.seed, conditions)
     out = args.out or (args.policy / "eval" if is_run(args.policy) else None)
     if out:
-        write_evaluation(out, table, summary)
-    if args.json:
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        write_summary(args.json, summary)
+        evaluation.write_evaluation(out, table, summary)
+    keep_summary(args.json, summary)
     print_measures(summary)
     return 0
 
 
 def _setup(args: argparse.Namespace, setup: Setup) -> Setup:
     """Returns what is simulated: the policy's own task, changed as asked."""
+    from fingers_mjx.evaluation.source import as_deployed, nominal, with_command
+    from fingers_mjx.runs.setup import overridden
+
     setup = as_deployed(nominal(setup) if args.nominal else setup)
     for command in args.commands or ():
         setup = with_command(setup, command)

@@ -1,19 +1,66 @@
-"""`fingers sysid excite`."""
+"""`fingers sysid excite`: motions that show what a joint is."""
 
 import argparse
+from pathlib import Path
 
-from envs.errors import InputError
-from envs.hand.hand_file import load_hand_file
-from sysid.excitation.check import fitting_plan
-from sysid.excitation.files import separation_lines, write_plan
-from sysid.excitation.plan import Limits, joint_groups
-from sysid.excitation.separation import separation
-from sysid.excitation.waves import WAVES
-from sysid.mechanism import Mechanism, hand_mechanism, mjcf_mechanism
+from fingers_mjx.cli.options import add_command, add_path, add_seed, number, whole
+from fingers_mjx.cli.records import add_mechanism, mechanism_of
+
+
+def add(actions) -> None:
+    """Adds the action and its arguments."""
+    parser = add_command(
+        actions,
+        "excite",
+        run,
+        "plan what to record",
+        "Plans motions that show what a joint is: targets.csv to play and plan.yaml "
+        "with what every part is for, the limits that the model keeps under it, and "
+        "which effects it can show and distinguish.",
+    )
+    add_mechanism(parser)
+    parser.add_argument(
+        "--joints",
+        nargs="+",
+        default=[],
+        metavar="NAME",
+        help="joints one by one, or groups that move together: a finger, flexion, "
+        "abduction, pip, dip; default: all joints one by one",
+    )
+    parser.add_argument(
+        "--waves",
+        nargs="+",
+        metavar="NAME",
+        help="slow_triangle small_triangle ramps steps pulses chirp multisine holds; "
+        "default: all",
+    )
+    for name, low, default, what in (
+        ("--rate", 1.0, 100.0, "targets in a second"),
+        ("--stretch", 0.1, 1.0, "factor on usual lengths"),
+        ("--reach", 0.0, 0.5, "largest excursion [rad]"),
+        ("--speed", 0.0, 4.0, "largest speed [rad/s]"),
+        ("--torque-share", 0.0, 0.9, "largest share of the torque (or current) limit"),
+    ):
+        what = f"{what} (default {default:g})"
+        parser.add_argument(name, type=number(low), default=default, help=what)
+    parser.add_argument("--repeats", type=whole(1, 100), default=3, help="default 3")
+    add_seed(parser)
+    parser.add_argument(
+        "--no-effects",
+        action="store_true",
+        help="leave out which effects it shows, which takes most of the time",
+    )
+    add_path(parser, "-o", "--out", metavar="DIR", default=Path("excite"))
 
 
 def run(args: argparse.Namespace) -> int:
-    """Plans an excitation and says what it shows."""
+    """Plans an excitation and reports what it shows."""
+    from sysid.excitation.check import fitting_plan
+    from sysid.excitation.files import separation_lines, write_plan
+    from sysid.excitation.plan import Limits, joint_groups
+    from sysid.excitation.separation import separation
+    from sysid.excitation.waves import WAVES
+
     mechanism = mechanism_of(args)
     limits = Limits(
         speed_rad_s=args.speed, torque_share=args.torque_share, reach_rad=args.reach
@@ -36,17 +83,3 @@ def run(args: argparse.Namespace) -> int:
     seconds = len(plan.targets) / plan.rate_hz
     print(f"{seconds:.0f} s of targets for {len(plan.moved)} joints in {args.out}")
     return 0
-
-
-def mechanism_of(args: argparse.Namespace) -> Mechanism:
-    """Returns the mechanism that the arguments name.
-
-    Raises:
-        InputError: an MJCF without drives, drives without an MJCF, or both kinds.
-    """
-    if (args.mjcf is None) != (args.drive is None) or (args.mjcf and args.hand):
-        found = " ".join(f"--{n}" for n in ("hand", "mjcf", "drive") if vars(args)[n])
-        raise InputError("arguments", "", found, "--hand, or --mjcf with --drive")
-    if args.mjcf is not None:
-        return mjcf_mechanism(args.mjcf, args.drive)
-    return hand_mechanism(load_hand_file(args.hand) if args.hand else None)

@@ -2,13 +2,30 @@
 
 import argparse
 
-from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.export.run import export_run
-from fingers_mjx.policy.source import check_run
+from fingers_mjx.cli.options import add_command, add_path, check_directory
+
+
+def add(commands) -> None:
+    """Adds the command and its arguments."""
+    parser = add_command(
+        commands,
+        "export",
+        run,
+        "write the policy of a run as a bundle",
+        "Write the policy of a run as a bundle. policy.onnx, manifest.json, "
+        "config.yaml and hand.yaml; fails if ONNX Runtime and JAX differ by more than "
+        "1e-5.",
+    )
+    add_path(parser, "run_dir", metavar="RUN", help="run directory")
+    what = "directory of the bundle; default RUN"
+    add_path(parser, "--out", metavar="DIR", help=what)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Exports and says how far the runtimes are from JAX."""
+    """Exports and prints how far the runtimes are from JAX."""
+    from fingers_mjx.export.run import export_run
+    from fingers_mjx.policy.source import check_run
+
     check_run(args.run_dir)
     out = args.out or args.run_dir
     check_directory("--out", out)

@@ -1,30 +1,188 @@
-"""`fingers hand show`, `fingers hand stance` and `fingers hand mjcf`."""
+"""`fingers hand`: its stance, its model, and a hand file from a user's own MJCF."""
+
+from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from envs.config.atomic_file import write_atomic
-from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
-from envs.hand.stance import settle, stance_json, stance_of
-from envs.hand.stance_search import search_stance
-from envs.hand.standing_mjcf import standing_mjcf
-from fingers_mjx.cli.paths import check_directory, check_file
+from envs.errors import InputError
+from fingers_mjx.cli.options import (
+    add_command,
+    add_path,
+    add_seed,
+    check_directory,
+    check_file,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from envs.hand.hand_file import HandFile
+
+STANCE_STARTS = 40
+"""Starts with which the stored stance was found."""
+
+_TURN = {"low": -1.0, "high": 1.0}
 
 
-def run(args: argparse.Namespace) -> int:
-    """Shows the hand, searches its stance or writes its model."""
-    check = check_directory if args.action == "show" else check_file
-    check("--out", args.out)
-    hand = load_hand_file(args.hand or DEFAULT_HAND_FILE)
-    if args.action == "show":
-        return _show(hand, args.out)
-    if args.action == "mjcf":
-        return _write(standing_mjcf(hand), args.out)
+@dataclass(frozen=True)
+class JointMap:
+    """How a user's model names what ours does.
+
+    Attributes:
+        joints: our joint name -> the model's, for those that differ.
+        palm_quat: our palm frame, back of the hand at -x and fingers at +z, in the
+            model's palm body, w x y z; found by the finger bases if not given.
+    """
+
+    joints: dict[str, str] = field(default_factory=dict)
+    palm_quat: tuple[float, float, float, float] | None = field(
+        default=None, metadata=_TURN
+    )
+
+    def __post_init__(self) -> None:
+        if self.palm_quat and abs(sum(x * x for x in self.palm_quat) - 1.0) > 1e-3:
+            valid = "w x y z of length 1"
+            raise InputError("joint map", "palm_quat", self.palm_quat, valid)
+
+
+def add(commands) -> None:
+    """Adds the command and its actions."""
+    summary = "look at the hand and its stance, or bring a hand of your own"
+    parser = commands.add_parser("hand", help=summary, description=f"L{summary[1:]}.")
+    actions = parser.add_subparsers(metavar="ACTION", required=True)
+    _add_show(actions)
+    _add_stance(actions)
+    _add_mjcf(actions)
+    _add_import(actions)
+
+
+def _add_show(actions) -> None:
+    parser = add_command(
+        actions,
+        "show",
+        show,
+        "draw the stance from four sides",
+        "Draws the stance from four sides, with the control frame V, fingertips, pad "
+        "normals and support polygon.",
+    )
+    add_path(parser, "--out", metavar="DIR", default=Path("hand"))
+    add_path(parser, "--hand", help="default: the paper's hand")
+
+
+def _add_stance(actions) -> None:
+    parser = add_command(
+        actions,
+        "stance",
+        stance,
+        "search the stance again",
+        "Searches the stance, settles it for 4 s and prints it as JSON.",
+    )
+    add_seed(parser)
+    parser.add_argument(
+        "--starts",
+        type=whole(1),
+        default=STANCE_STARTS,
+        help=f"random starts of the search (default {STANCE_STARTS})",
+    )
+    add_path(parser, "--out", help="instead of stdout")
+    add_path(parser, "--hand", help="default: the paper's hand")
+
+
+def _add_mjcf(actions) -> None:
+    parser = add_command(
+        actions,
+        "mjcf",
+        mjcf,
+        "write the hand as MJCF",
+        "Writes the hand, standing, as one MJCF file: the model for fingers-deploy run "
+        "--driver sim, or to look at in any MuJoCo viewer.",
+    )
+    add_path(parser, "-o", "--out", help="instead of stdout")
+    add_path(parser, "--hand", help="default: the paper's hand")
+
+
+def _add_import(actions) -> None:
+    parser = add_command(
+        actions,
+        "import",
+        import_mjcf,
+        "make a hand file of an MJCF of your own",
+        "Carries an MJCF of the hand, such as the vendor's with meshes, over into a "
+        "hand file for --hand: kinematics, inertia, limits and gains are its own, "
+        "collision shapes are fitted to it. Lists what it lacks.",
+    )
+    add_path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
+    what = "YAML: joints, our names to the model's; palm_quat, where asked for"
+    add_path(parser, "--joint-map", help=what)
+    add_path(parser, "-o", "--out", required=True, help="hand file")
+
+
+def show(args: argparse.Namespace) -> int:
+    """Draws the stance and prints it in numbers."""
+    check_directory("--out", args.out)
+    hand = _hand(args)  # a file that is no hand is refused before Pillow is asked for
+    from PIL import Image
+
+    from envs.hand.stance import stance_of
+    from fingers_mjx.pictures.hand import facts, pictures, posed
+
+    standing = posed(hand, stance_of(hand))
+    for name, value in facts(standing).items():
+        print(f"{name:24} {value:8.1f}")
+    args.out.mkdir(parents=True, exist_ok=True)
+    for name, picture in pictures(standing).items():
+        Image.fromarray(picture).save(args.out / f"{name}.png")
+        print(f"wrote {args.out / f'{name}.png'}")
+    return 0
+
+
+def stance(args: argparse.Namespace) -> int:
+    """Searches the stance."""
+    from envs.hand.stance import settle, stance_json
+    from envs.hand.stance_search import search_stance
+
+    check_file("--out", args.out)
+    hand = _hand(args)
     qpos, target = search_stance(hand, args.seed, args.starts)
     return _write(stance_json(settle(hand, qpos, target)), args.out)
 
 
+def mjcf(args: argparse.Namespace) -> int:
+    """Writes the model of the hand."""
+    from envs.hand.standing_mjcf import standing_mjcf
+
+    check_file("--out", args.out)
+    return _write(standing_mjcf(_hand(args)), args.out)
+
+
+def import_mjcf(args: argparse.Namespace) -> int:
+    """Imports, lists what was filled in, and writes the hand file."""
+    from envs.config.typed import load_yaml
+    from envs.hand.hand_file import hand_yaml
+    from envs.hand.importing.figures import import_hand
+
+    check_file("--out", args.out)
+    given = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
+    found = import_hand(args.mjcf, given.joints, given.palm_quat)
+    for sentence in found.told:
+        print(sentence)
+    print(_standing(found.hand))
+    _write(hand_yaml(found.hand), args.out)
+    print(f"wrote {args.out}")
+    return 0
+
+
+def _hand(args: argparse.Namespace) -> HandFile:
+    from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
+
+    return load_hand_file(args.hand or DEFAULT_HAND_FILE)
+
+
 def _write(text: str, out: Path | None) -> int:
+
     if out:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(out, text)
@@ -33,16 +191,11 @@ def _write(text: str, out: Path | None) -> int:
     return 0
 
 
-def _show(hand: HandFile, out: Path) -> int:
-    from PIL import Image
+def _standing(hand: HandFile) -> str:
+    from envs.hand.stance import stance_of
 
-    from fingers_mjx.pictures.hand import facts, pictures, posed
-
-    standing = posed(hand, stance_of(hand))
-    for name, value in facts(standing).items():
-        print(f"{name:24} {value:8.1f}")
-    out.mkdir(parents=True, exist_ok=True)
-    for name, picture in pictures(standing).items():
-        Image.fromarray(picture).save(out / f"{name}.png")
-        print(f"wrote {out / f'{name}.png'}")
-    return 0
+    try:
+        height = 1000 * stance_of(hand).root_pos_w[2]
+    except InputError as error:
+        return f"does not stand under the stored joint targets: {error.found}"
+    return f"stands under the stored joint targets, the palm {height:.1f} mm up"

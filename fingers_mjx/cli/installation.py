@@ -13,13 +13,13 @@ OURS = ("rewards", "envs", "sysid")
 
 
 class UnsupportedInstallation(RuntimeError):
-    """What is installed cannot work together, told in one sentence (status 6)."""
+    """What is installed cannot work together, in one sentence (status 6)."""
 
     exit_code = 6
 
 
 def check_installation() -> None:
-    """Checks the versions that this distribution asks for, and who is who.
+    """Checks the versions that this distribution asks for.
 
     Brax fails on newer versions of JAX, some versions of jaxlib hang on the CPU, and an
     installer that is asked for another package may well change them: so the versions
@@ -29,7 +29,6 @@ def check_installation() -> None:
         UnsupportedInstallation: naming the first package, what was found and what
             would be valid.
     """
-    check_places(Path(__file__).parents[2])
     try:
         own = metadata.metadata(DISTRIBUTION)
     except metadata.PackageNotFoundError:
@@ -39,8 +38,10 @@ def check_installation() -> None:
         check_requirement(text)
 
 
-def check_places(root: Path) -> None:
+def check_places(root: Path = Path(__file__).parents[2]) -> None:
     """Raises if one of our packages with a common name is somebody else's.
+
+    Before anything of them is imported.
 
     Args:
         root: directory from which `fingers_mjx` was imported.
@@ -71,7 +72,7 @@ def check_requirement(text: str) -> None:
 
     Args:
         text: as in package metadata, such as "jax<0.10,>=0.8.1"; requirements of
-            extras are left alone.
+            extras are not looked at.
 
     Raises:
         UnsupportedInstallation: naming the package, its version and the valid ones.

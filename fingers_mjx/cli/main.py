@@ -5,14 +5,19 @@ installation that cannot work; 75 stopped by a signal after a checkpoint, go on 
 --resume; 130 stopped by the keyboard.
 """
 
+import argparse
 import importlib
 import os
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import NoReturn
 
-from fingers_mjx.cli.arguments import UsageError, make_parser
-from fingers_mjx.cli.installation import check_installation
+from fingers_mjx.cli.installation import check_installation, check_places
+
+COMMANDS = ("train", "evaluate", "export", "play", "hand")
+SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
+"""Modules of the commands, and of the actions of `fingers sysid`."""
 
 BAD_INPUT, DISK_FULL, KEYBOARD = 2, 4, 130
 _EXTRAS = {
@@ -25,22 +30,59 @@ _EXTRAS = {
 }
 
 
+class UsageError(Exception):
+    """Words on the command line that do not fit, in one sentence."""
+
+
+class _Parser(argparse.ArgumentParser):
+    """Puts a mistake into one sentence and leaves the exit to `main`."""
+
+    def error(self, message: str) -> NoReturn:
+        raise UsageError(f"{message} (see {self.prog} --help)")
+
+
+def make_parser() -> argparse.ArgumentParser:
+    """Returns the parser of all commands; each names its function in `args.run`."""
+    parser = _Parser(
+        prog="fingers",
+        description="Teach an anthropomorphic hand to walk on its fingertips.",
+        epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 6 an "
+        "installation that cannot work, 75 stopped by a signal after saving (go on "
+        "with --resume).",
+        allow_abbrev=False,
+    )
+    commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
+    for name in COMMANDS:
+        _add(commands, name)
+    summary = "look at measured logs"
+    sysid = commands.add_parser("sysid", help=summary, description=f"L{summary[1:]}.")
+    actions = sysid.add_subparsers(metavar="ACTION", required=True)
+    for name in SYSID:
+        _add(actions, name)
+    _add(commands, "demo")
+    return parser
+
+
+def _add(commands, name: str) -> None:
+    """Imports a command, which imports what is heavy when it runs, and adds it."""
+    importlib.import_module(f"fingers_mjx.cli.{name}").add(commands)
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Runs one command and returns its exit status; errors are one sentence on stderr.
 
     Args:
         argv: arguments after the program's name; those of the process if not given.
     """
-    # Nothing of JAX is imported before the command is known: --help answers at once.
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     try:
+        check_places()
         args = make_parser().parse_args(argv)
         check_installation()
         # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
         warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
         importlib.import_module("envs.physics.quiet_mjx")
-        command = importlib.import_module(f"fingers_mjx.cli.{args.module}")
-        return command.run(args)
+        return args.run(args)
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)
     except Exception as error:

@@ -1,41 +1,116 @@
 """`fingers play`: an exported policy in plain C MuJoCo, through the shim."""
 
+from __future__ import annotations
+
 import argparse
 import dataclasses
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from fingers_deploy import Bundle
-from fingers_mjx.cli.output import counting
-from fingers_mjx.cli.paths import check_file
-from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
-from fingers_mjx.cli.table import print_measures
-from fingers_mjx.evaluation.files import write_summary
-from fingers_mjx.evaluation.source import (
-    document,
-    nominal,
-    with_command,
-    without_practice,
+from fingers_mjx.cli.options import (
+    add_command,
+    add_episodes,
+    add_fixed_command,
+    add_path,
+    add_seed,
+    check_file,
+    number,
+    whole,
 )
-from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
-from fingers_mjx.play.keyboard import TASK as KEYBOARD
-from fingers_mjx.play.keyboard import KeyPlayer, keys_story
-from fingers_mjx.play.keyboard_video import write_keyboard_video
-from fingers_mjx.play.player import Player, Schedule
-from fingers_mjx.play.recovery import (
-    RecoveryPlayer,
-    check_chain,
-    is_recovery,
-    story,
-)
-from fingers_mjx.play.video import VIDEO_SUFFIXES, write_video
-from fingers_mjx.policy.source import PolicySource, load_bundle_setup
-from fingers_mjx.runs.setup import Setup, make_env
+from fingers_mjx.play.sokoban import LEVELS, SOLUTIONS, Board, read_level
+
+if TYPE_CHECKING:
+    from envs.tasks.keyboard.task import KeyboardConfig
+    from fingers_deploy import Bundle
+    from fingers_mjx.play.episodes import Session
+    from fingers_mjx.play.player import Player, Schedule
+    from fingers_mjx.runs.setup import Setup
+    from fingers_robot.behaviour.keys import KeyTimes
+
+
+def add(commands) -> None:
+    """Adds the command and its arguments."""
+    parser = add_command(
+        commands,
+        "play",
+        run,
+        "close the loop in plain C MuJoCo through the deployment shim",
+        "Close the loop in plain C MuJoCo through the deployment shim. Physics at 200 "
+        "Hz, the exported policy at 50 Hz through fingers_deploy; the training "
+        "environment takes no part.",
+    )
+    what = "bundle directory or policy.onnx"
+    add_path(parser, "bundle", metavar="BUNDLE", help=what)
+    add_path(
+        parser,
+        "--then",
+        metavar="BUNDLE",
+        help="after a recovery: policy that takes over once the hand stands, under "
+        "--command (default: its fastest forward)",
+    )
+    _add_keys(parser)
+    add_path(parser, "--video", help=".mp4, .webp or .gif to write")
+    parser.add_argument(
+        "--seconds", type=number(0.1), default=20.0, help="length (default 20)"
+    )
+    add_episodes(parser, 1)
+    add_seed(parser)
+    what = "m/s, m/s, rad/s in V; given several times, they share the time equally"
+    add_fixed_command(parser, what)
+    parser.add_argument(
+        "--randomize",
+        action="store_true",
+        help="worlds, sensor noise and starts as drawn in training; else the nominal "
+        "hand",
+    )
+    parser.add_argument(
+        "--friction", type=number(0.0), metavar="MU", help="friction of the fingertips"
+    )
+    parser.add_argument(
+        "--runtime",
+        choices=("auto", "onnxruntime", "numpy"),
+        default="auto",
+        help="what runs the policy",
+    )
+    parser.add_argument(
+        "--fps", type=number(1.0), default=25.0, help="frames per second (default 25)"
+    )
+    parser.add_argument(
+        "--width", type=whole(64, 4096), default=640, help="of the video (default 640)"
+    )
+    add_path(parser, "--json", help="summary to write")
+
+
+def _add_keys(parser) -> None:
+    parser.add_argument(
+        "--keys",
+        metavar="KEY,KEY",
+        help="keyboard: what to press, out of left, down, right, up",
+    )
+    parser.add_argument(
+        "--level",
+        choices=tuple(LEVELS),
+        help="keyboard: a Sokoban level, its shortest solution pressed key by key",
+    )
+    parser.add_argument(
+        "--retries",
+        type=whole(0, 10),
+        default=0,
+        help="keyboard: ask again after a time-out (default 0)",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
     """Plays; the table goes to stdout, progress to stderr."""
+    from fingers_mjx.cli.output import counting, keep_summary, print_measures
+    from fingers_mjx.evaluation.source import document
+    from fingers_mjx.play.episodes import play_episodes
+    from fingers_mjx.play.keyboard import KeyPlayer, keys_story
+    from fingers_mjx.play.recovery import RecoveryPlayer, story
+    from fingers_mjx.play.video import VIDEO_SUFFIXES
+    from fingers_mjx.policy.source import PolicySource, load_bundle_setup
+
     if args.video and args.video.suffix not in VIDEO_SUFFIXES:
         valid = one_of(VIDEO_SUFFIXES)
         raise InputError("--video", "suffix", args.video.suffix, valid)
@@ -53,9 +128,7 @@ def run(args: argparse.Namespace) -> int:
     trained_steps = bundle.manifest.provenance.normalizer.steps
     source = PolicySource(args.bundle, setup, bundle.network, trained_steps)
     summary = document(source, played.table, args.seed, _conditions(args, played))
-    if args.json:
-        args.json.parent.mkdir(parents=True, exist_ok=True)
-        write_summary(args.json, summary)
+    keep_summary(args.json, summary)
     if args.video:
         _film(args, bundle, player, played)
     print_measures(summary)
@@ -66,8 +139,51 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def keys_asked(args: argparse.Namespace, bundle: Bundle) -> tuple[str, ...] | None:
+    """Returns the keys that the options ask for; None if they ask for none.
+
+    Raises:
+        InputError: for a policy of another task, both options, or an unknown key.
+    """
+    from fingers_robot.behaviour.keys import ARROWS
+
+    if args.keys is None and args.level is None:
+        return None
+    option = "--keys" if args.level is None else "--level"
+    if bundle.manifest.task != "keyboard":
+        raise InputError(option, "", bundle.manifest.task, "a keyboard policy")
+    if args.keys is not None and args.level is not None:
+        raise InputError("--keys", "", args.keys, "either --keys or --level")
+    if args.level:
+        return SOLUTIONS[LEVELS[args.level]]
+    names = tuple(name.strip() for name in str(args.keys).split(","))
+    for name in names:
+        if name not in ARROWS:
+            raise InputError("--keys", "", name or "nothing", one_of(ARROWS, name))
+    return names
+
+
+def start_board(args: argparse.Namespace) -> Board | None:
+    """Returns the board that the keys move, if a level is played."""
+    return None if args.level is None else read_level(LEVELS[args.level])
+
+
+def key_times(args: argparse.Namespace, config: KeyboardConfig) -> KeyTimes:
+    """Returns gap and time-out: the mean gap and the time-out of training."""
+    from fingers_robot.behaviour.keys import KeyTimes
+
+    requests = config.requests
+    return KeyTimes(sum(requests.idle_s) / 2, requests.timeout_s, args.retries)
+
+
 def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
     """Returns what plays the bundle; recoveries end as the shim ends them."""
+    from fingers_mjx.play.keyboard import KeyPlayer
+    from fingers_mjx.play.player import Player
+    from fingers_mjx.play.recovery import RecoveryPlayer, check_chain, is_recovery
+    from fingers_mjx.policy.source import load_bundle_setup
+    from fingers_mjx.runs.setup import make_env
+
     keys = keys_asked(args, bundle)
     env = make_env(setup, 1, "cpu")
     if keys is not None:
@@ -88,6 +204,9 @@ def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
 
 def _schedule(args: argparse.Namespace, bundle: Bundle, steps: int) -> Schedule | None:
     """Returns the command of each step; a recovery has none."""
+    from fingers_mjx.play.episodes import schedule_of
+    from fingers_mjx.play.recovery import is_recovery
+
     if not args.commands or is_recovery(bundle):
         return None
     return schedule_of(args.commands, steps)
@@ -99,6 +218,8 @@ def _then_name(args: argparse.Namespace) -> str | None:
 
 def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     """Returns the worlds to play in."""
+    from fingers_mjx.evaluation.source import nominal, with_command, without_practice
+
     setup = without_practice(trained if args.randomize else nominal(trained))
     if args.commands and len(args.commands) == 1 and args.then is None:
         setup = with_command(setup, args.commands[0])
@@ -114,28 +235,26 @@ def _film(
     args: argparse.Namespace, bundle: Bundle, player: Player, played: Session
 ) -> None:
     """Draws the first episode."""
+    from fingers_mjx.cli.output import counting
+    from fingers_mjx.play.keyboard_video import write_keyboard_video
+    from fingers_mjx.play.video import Film, write_video
+
     args.video.parent.mkdir(parents=True, exist_ok=True)
-    model, dt_s = player.env.mj_model, player.env.dt
-    how = (args.video, model, played.first, dt_s, args.fps, args.width)
     with counting(sys.stderr, "drawing", "frames") as progress:
-        if bundle.manifest.task == KEYBOARD:
-            write_keyboard_video(*how, progress, start_board(args))
+        film = Film(args.video, args.fps, args.width, progress)
+        if bundle.manifest.task == "keyboard":
+            write_keyboard_video(film, player.env, played.first, start_board(args))
         else:
-            write_video(*how, progress)
+            write_video(film, player.env, played.first)
 
 
 def _conditions(args: argparse.Namespace, played: Session) -> dict[str, Any]:
     """Returns what it takes to repeat it."""
+    names = ("seconds", "commands", "keys", "level", "retries", "randomize", "friction")
     return {
         "loop": "C MuJoCo through fingers_deploy",
         "runtime": args.runtime,
         "then": _then_name(args),
-        "seconds": args.seconds,
-        "commands": args.commands,
-        "keys": args.keys,
-        "level": args.level,
-        "retries": args.retries,
-        "randomize": args.randomize,
-        "friction": args.friction,
+        **{name: getattr(args, name) for name in names},
         "steps_held": played.held,
     }

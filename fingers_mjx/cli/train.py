@@ -1,36 +1,71 @@
 """`fingers train`: a new run, or one to go on with."""
 
+from __future__ import annotations
+
 import argparse
-import dataclasses
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from envs.physics import BACKENDS, default_backend
-from envs.physics.quiet_mjx import WARP_INSTALLED
-from envs.registry import get_task, task_names
-from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.ppo.config import TrainConfig, preset
-from fingers_mjx.ppo.state import train_template
-from fingers_mjx.runs.setup import (
-    Setup,
-    identity,
-    make_env,
-    new_setup,
-    overridden,
-    run_setup,
+from fingers_mjx.cli.options import (
+    add_backend,
+    add_command,
+    add_path,
+    add_seed,
+    add_settings,
+    check_directory,
+    train_config,
 )
-from fingers_mjx.training.progress import reporter
-from fingers_mjx.training.train import train
-from fingers_mjx.training.warm_start import started_from
+
+if TYPE_CHECKING:
+    from fingers_mjx.ppo.config import TrainConfig
+    from fingers_mjx.runs.setup import Setup
 
 _FOR_NEW_RUNS = ("hand", "out", "warm_start")
 
 
+def add(commands) -> None:
+    """Adds the command and its arguments."""
+    parser = add_command(
+        commands,
+        "train",
+        run,
+        "train a policy",
+        "Train a policy. Shows progress live on a terminal, as JSON lines otherwise. "
+        "SIGINT saves and stops; --resume goes on.",
+    )
+    parser.add_argument("task", metavar="TASK", nargs="?", help="such as crawl")
+    parser.add_argument(
+        "--preset",
+        metavar="NAME",
+        help="paper (its settings), fast (one GPU) or cpu (small); default: by machine",
+    )
+    what = "a setting such as ppo.entropy_cost=0.001 or env.action_clip=0.8"
+    add_settings(parser, what)
+    add_backend(parser)
+    add_seed(parser, None)
+    add_path(parser, "--hand", help="hand.yaml; default: the paper's hand")
+    add_path(parser, "--out", metavar="RUN", help="new directory; default: under runs/")
+    add_path(parser, "--resume", metavar="RUN", help="go on with this run")
+    add_path(
+        parser,
+        "--warm-start",
+        metavar="RUN|BUNDLE",
+        help="start from the networks of this run or checkpoint, or from the policy of "
+        "a bundle, which may be of another task",
+    )
+
+
 def run(args: argparse.Namespace) -> int:
     """Trains, and reports on stdout."""
+    from fingers_mjx.ppo.state import train_template
+    from fingers_mjx.runs.setup import identity, make_env
+    from fingers_mjx.training.progress import reporter
+    from fingers_mjx.training.train import train
+    from fingers_mjx.training.warm_start import started_from
+
     _check_words(args.settings)
     check_directory("--out", args.out)
     resume = args.resume is not None
@@ -41,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     if args.warm_start is not None:  # refused before anything is written
         started_from(train_template(env, setup.train.ppo), env, args.warm_start)
     with reporter(sys.stdout) as show:
-        show({"event": "note", "text": _headline(setup, path)})
+        show({"event": "note", "text": _headline(setup.train, path)})
         result = train(
             lambda num_envs: env,
             setup.train,
@@ -60,17 +95,14 @@ def run(args: argparse.Namespace) -> int:
 
 def _new(args: argparse.Namespace) -> Setup:
     """Returns the settings of a new run."""
+    from envs.registry import get_task, task_names
+    from fingers_mjx.runs.setup import new_setup, overridden
+
     if args.task is None:
         raise InputError("TASK", "", "", one_of(task_names()))
     get_task(args.task)
-    backend = check_backend(args.backend or default_backend())
-    name = args.preset or ("fast" if backend == "warp" else "cpu")
-    chosen = preset(name, args.task)
-    given: dict[str, Any] = {"backend": backend}
-    if args.seed is not None:
-        given["seed"] = args.seed
-    train_config = dataclasses.replace(chosen, **given)
-    return overridden(new_setup(train_config, args.hand), args.settings)
+    setup = new_setup(train_config(args, args.seed), args.hand)
+    return overridden(setup, args.settings)
 
 
 def _check_words(assignments: list[str]) -> None:
@@ -87,6 +119,8 @@ def _check_words(assignments: list[str]) -> None:
 
 def _resumed(args: argparse.Namespace) -> Setup:
     """Returns the saved settings; what may be changed in them, `--set` changes."""
+    from fingers_mjx.runs.setup import overridden, run_setup
+
     for name in _FOR_NEW_RUNS:
         if (found := getattr(args, name)) is not None:
             option = f"--{name.replace('_', '-')}"
@@ -99,31 +133,16 @@ def _resumed(args: argparse.Namespace) -> Setup:
     return overridden(saved, args.settings)
 
 
-def check_backend(name: str) -> str:
-    """Returns `name`, the name of a physics backend.
-
-    Raises:
-        InputError: there is no such backend, or it is not installed.
-    """
-    if name not in BACKENDS:
-        raise InputError("--backend", "", name, one_of(BACKENDS, name))
-    if name == "warp" and not WARP_INSTALLED:
-        valid = 'what is installed; pip install "fingers-mjx[warp]" for warp'
-        raise InputError("--backend", "", name, valid)
-    return name
-
-
 def _default_dir(config: TrainConfig) -> Path:
     """Returns a directory of this second under `runs/`."""
     now = time.strftime("%Y%m%d-%H%M%S")
     return Path("runs") / f"{config.task}-{config.preset}-{config.seed}-{now}"
 
 
-def _headline(setup: Setup, path: Path) -> str:
-    train_config = setup.train
-    steps: Any = train_config.iterations * train_config.steps_per_iteration
+def _headline(config: TrainConfig, path: Path) -> str:
+    steps: Any = config.iterations * config.steps_per_iteration
     return (
-        f"training {train_config.task} (preset {train_config.preset}, backend "
-        f"{train_config.backend}): {train_config.iterations} iterations, "
-        f"{steps / 1e6:.4g} M control steps, into {path}"
+        f"training {config.task} (preset {config.preset}, backend {config.backend}): "
+        f"{config.iterations} iterations, {steps / 1e6:.4g} M control steps, into "
+        f"{path}"
     )

@@ -1,23 +1,29 @@
-"""`fingers sysid transfer`: what a found effect is worth on the real hand."""
+"""`fingers sysid transfer`: what modelling an effect gains on the real hand."""
+
+from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import sys
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from envs.hand.hand_file import load_hand_file
-from envs.physics import default_backend
-from fingers_mjx.cli.paths import check_directory
-from fingers_mjx.cli.train import check_backend
-from fingers_mjx.policy.source import PolicySource, load_source
-from fingers_mjx.ppo.config import preset
-from fingers_mjx.runs.setup import Setup, new_setup, overridden
-from fingers_mjx.training.progress import reporter
-from fingers_mjx.transfer import compared, in_real_hand, train_on
+from fingers_mjx.cli.options import (
+    add_backend,
+    add_command,
+    add_path,
+    add_seed,
+    add_settings,
+    backend_of,
+    check_directory,
+    train_config,
+    whole,
+)
+
+if TYPE_CHECKING:
+    from fingers_mjx.policy.source import PolicySource
 
 NAMES: tuple[str, str] = ("default", "extended")
 
@@ -28,17 +34,56 @@ _NOTE = (
 )
 
 
+def add(actions) -> None:
+    """Adds the action and its arguments."""
+    parser = add_command(
+        actions,
+        "transfer",
+        run,
+        "measure what modelling an effect gains",
+        "Trains one policy on the default hand and one on the extended hand with equal "
+        "budget, then lets both walk in the simulator of the real hand: task speed, "
+        "drift, survival. Writes OUT/transfer.json beside both runs.",
+    )
+    what = "hand.yaml of the simulator that stands for the real hand"
+    add_path(parser, "--real", required=True, help=what)
+    add_path(parser, "--extended", help="hand.yaml of a diagnosis")
+    add_path(parser, "--default", help="default: the paper's hand")
+    add_path(
+        parser,
+        "--policies",
+        nargs=2,
+        metavar="POLICY",
+        help="compare these, run directories or bundles, instead of training",
+    )
+    parser.add_argument("--task", metavar="TASK", default="crawl", help="default crawl")
+    parser.add_argument("--preset", metavar="NAME", help="as in fingers train")
+    what = "fine-tune this policy on both hands"
+    add_path(parser, "--warm-start", metavar="RUN|BUNDLE", help=what)
+    add_settings(parser, "a setting of both trainings, as in fingers train")
+    add_backend(parser)
+    parser.add_argument(
+        "--episodes", type=whole(1), default=64, help="of each kind (default 64)"
+    )
+    parser.add_argument("--steps", type=whole(1), help="control steps of an episode")
+    add_seed(parser)
+    add_path(parser, "-o", "--out", metavar="OUT", default=Path("transfer"))
+
+
 def run(args: argparse.Namespace) -> int:
     """Trains both policies, unless they are given, and compares them."""
-    backend = check_backend(args.backend or default_backend())
+    from envs.hand.hand_file import load_hand_file
+    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.transfer import compared, in_real_hand
+
+    backend = backend_of(args)
     check_directory("--out", args.out)
     if (args.policies is None) == (args.extended is None):
         found = "both" if args.policies else "neither"
         valid = "hands to train on (--extended) or trained policies (--policies)"
         raise InputError("transfer", "", found, valid)
     real = load_hand_file(args.real)
-    paths = args.policies or _trained(args, backend)
-    loaded = map(load_source, paths)
+    loaded = map(load_source, args.policies or _trained(args))
     sources: dict[str, PolicySource] = dict(zip(NAMES, loaded, strict=True))
     _check_alike(sources)
     found = {}
@@ -61,9 +106,15 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _trained(args: argparse.Namespace, backend: str) -> list[Path]:
+def _trained(args: argparse.Namespace) -> list[Path]:
     """Trains both, with the same settings and the same seed."""
-    setup = _setup(args, backend)
+    from envs.hand.hand_file import load_hand_file
+    from fingers_mjx.runs.setup import new_setup, overridden
+    from fingers_mjx.training.progress import reporter
+    from fingers_mjx.transfer import train_on
+
+    config = train_config(args, args.seed)
+    setup = overridden(new_setup(config, args.default), args.settings)
     hands = {"default": setup.hand, "extended": load_hand_file(args.extended)}
     if hands["default"].sha256 == hands["extended"].sha256:
         valid = "another hand than the default one"
@@ -74,14 +125,6 @@ def _trained(args: argparse.Namespace, backend: str) -> list[Path]:
             show({"event": "note", "text": f"training on the {name} hand"})
             train_on(setup, hand, path, args.warm_start, show)
     return paths
-
-
-def _setup(args: argparse.Namespace, backend: str) -> Setup:
-    """Settings of both trainings."""
-    name = args.preset or ("fast" if backend == "warp" else "cpu")
-    given: dict[str, Any] = {"backend": backend, "seed": args.seed}
-    train = dataclasses.replace(preset(name, args.task), **given)
-    return overridden(new_setup(train, args.default), args.settings)
 
 
 def _check_alike(sources: dict[str, PolicySource]) -> None:

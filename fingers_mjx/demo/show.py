@@ -14,7 +14,7 @@ from fingers_mjx.evaluation.source import (
 )
 from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
 from fingers_mjx.play.player import Player
-from fingers_mjx.play.video import write_video
+from fingers_mjx.play.video import Film, write_video
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.runs.setup import make_env
 
@@ -103,10 +103,10 @@ def _film(
     out: Path, bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
 ) -> tuple[Session, Path]:
     player = Player(make_env(nominal(source.setup), 1, "cpu"), bundle)
-    model, dt_s = player.env.mj_model, player.env.dt
-    steps = round(size.film_s / dt_s)
+    steps = round(size.film_s / player.env.dt)
     film = play_episodes(player, 1, steps, schedule=schedule_of(FILM, steps))
     path = out / "walk.mp4"
     with screen.counting("drawing", "frames") as count:
-        write_video(path, model, film.first, dt_s, size.fps, size.width, count)
+        how = Film(path, size.fps, size.width, count)
+        write_video(how, player.env, film.first)
     return film, path

@@ -34,6 +34,8 @@ TWO_BOXES = """\
 #######"""
 """Two boxes; the shortest solution has 12 moves."""
 
+LEVELS = {"one-box": ONE_BOX, "two-boxes": TWO_BOXES}
+
 SOLUTIONS: dict[str, tuple[str, ...]] = {
     ONE_BOX: (
         *("down", "down", "down", "right", "up"),

@@ -1,12 +1,13 @@
 """Video of a played episode: ray-cast, with a camera that follows the hand."""
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
-import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from envs.batch import BatchEnv
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import caption
 from fingers_mjx.pictures.video import Frame, follow, frames, write_animation, write_mp4
@@ -19,35 +20,53 @@ AHEAD_M = 0.06
 """From the palm's origin to the middle of the hand."""
 
 
-def write_video(
-    path: Path,
-    model: mujoco.MjModel,
-    played: Played,
-    dt_s: float,
-    fps: float,
-    width: int,
-    progress: Callable[[int, int], None],
-) -> Path:
-    """Writes a film of an episode.
+@dataclass(frozen=True)
+class Film:
+    """How an episode is filmed.
 
-    Args:
+    Attributes:
         path: file to write, with one of `VIDEO_SUFFIXES`.
-        model: the scene.
-        played: the episode.
-        dt_s: control interval.
         fps: frames per second.
         width: of the picture; its height is 9/16 of that.
-        progress: told (frames drawn, frames in all).
+        progress: called with (frames drawn, frames in all).
     """
-    steps = frame_steps(len(played.qpos), dt_s, fps)
-    qpos = played.qpos[steps]
-    cameras = follow(_view(qpos[0], target_of(played)), qpos[:, :3], fps)
-    size = (width, 2 * round(width * ASPECT / 2))
-    pictures = frames(model, qpos, cameras, size)
-    marked = with_target(pictures, cameras, target_of(played))
-    texts = [_text(played, step, dt_s) for step in steps]
-    write = write_mp4 if path.suffix == ".mp4" else write_animation
-    return write(path, _captioned(marked, texts, progress), fps)
+
+    path: Path
+    fps: float
+    width: int
+    progress: Callable[[int, int], None]
+
+    @property
+    def height(self) -> int:
+        """Rows of the picture, an even number."""
+        return 2 * round(self.width * ASPECT / 2)
+
+    def write(self, pictures: Iterator[Frame], count: int) -> Path:
+        """Writes `count` pictures and reports the progress."""
+        write = write_mp4 if self.path.suffix == ".mp4" else write_animation
+        return write(self.path, self._counted(pictures, count), self.fps)
+
+    def _counted(self, pictures: Iterator[Frame], count: int) -> Iterator[Frame]:
+        for number, picture in enumerate(pictures, 1):
+            yield picture
+            self.progress(number, count)
+
+
+def write_video(film: Film, env: BatchEnv, played: Played) -> Path:
+    """Writes an episode, seen from a camera that follows the hand.
+
+    Args:
+        film: where, how fast and how large.
+        env: of the scene and the control interval.
+        played: the episode.
+    """
+    steps = frame_steps(len(played.qpos), env.dt, film.fps)
+    qpos, target_w = played.qpos[steps], target_of(played)
+    cameras = follow(_view(qpos[0], target_w), qpos[:, :3], film.fps)
+    pictures = frames(env.mj_model, qpos, cameras, (film.width, film.height))
+    marked = with_target(pictures, cameras, target_w)
+    texts = [_text(played, step, env.dt) for step in steps]
+    return film.write(map(caption, marked, texts), len(texts))
 
 
 def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
@@ -73,16 +92,6 @@ def _view(qpos: Float[np.ndarray, " nq"], target_w: Target) -> Camera:
         azimuth_deg=float(np.degrees(heading)) + (248.0 if target_w is None else 205.0),
         elevation_deg=-18.0 if target_w is None else -32.0,
     )
-
-
-def _captioned(
-    pictures: Iterator[Frame],
-    texts: list[str],
-    progress: Callable[[int, int], None],
-) -> Iterator[Frame]:
-    for index, (picture, text) in enumerate(zip(pictures, texts, strict=True)):
-        yield caption(picture, text)
-        progress(index + 1, len(texts))
 
 
 def _text(played: Played, step: int, dt_s: float) -> str:

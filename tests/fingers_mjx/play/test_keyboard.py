@@ -15,13 +15,14 @@ from envs.errors import InputError
 from envs.tasks.keyboard.fingertip import JOINTS
 from envs.tasks.keyboard.model import KEY_NAMES
 from fingers_deploy import load_bundle
-from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
+from fingers_mjx.cli.play import key_times, keys_asked, start_board
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.keyboard import KeyPlayer, KeysPlayed, boards_of, keys_story
 from fingers_mjx.play.keyboard_video import write_keyboard_video
 from fingers_mjx.play.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
 from fingers_mjx.play.sokoban_board import draw_panel
+from fingers_mjx.play.video import Film
 from fingers_mjx.runs.setup import make_env, new_setup
 from fingers_robot.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
 
@@ -157,12 +158,9 @@ def test_a_level_is_solved_by_simulated_key_strokes(player, tmp_path):
     assert columns["latency_median_s"] == pytest.approx(np.median(told), abs=1e-3)
     assert boards_of(session.first.trace, START)[-1].solved
 
-    model, dt_s = player.env.mj_model, player.env.dt
-    film = tmp_path / "level.webp"
-    write_keyboard_video(
-        film, model, session.first, dt_s, 1.0, 128, lambda *_: None, START
-    )
-    assert film.stat().st_size > 1000
+    film = Film(tmp_path / "level.webp", 1.0, 128, lambda *_: None)
+    write_keyboard_video(film, player.env, session.first, START)
+    assert film.path.stat().st_size > 1000
 
 
 @pytest.mark.slow

@@ -1,0 +1,189 @@
+"""Options that several commands share, and how their values are read and checked."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import math
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from envs.errors import InputError, one_of
+
+if TYPE_CHECKING:
+    from fingers_mjx.ppo.config import TrainConfig
+
+MAX_SEED = 2**32 - 1
+POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
+
+
+def add_command(
+    commands, name: str, run: Callable, summary: str, details: str
+) -> argparse.ArgumentParser:
+    """Adds a command and returns its parser; `run` is called with its arguments."""
+    parser = commands.add_parser(
+        name, help=summary, description=details, allow_abbrev=False
+    )
+    parser.set_defaults(run=run)
+    return parser
+
+
+def whole(low: int, high: int | None = None) -> Callable[[str], int]:
+    """Returns a converter to whole numbers from `low` to `high`."""
+
+    def convert(text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            value = None
+        if value is None or value < low or (high is not None and value > high):
+            limit = f" and at most {high}" if high is not None else ""
+            raise argparse.ArgumentTypeError(
+                f"found {text}; valid: a whole number of at least {low}{limit}"
+            )
+        return value
+
+    return convert
+
+
+def number(low: float = -math.inf) -> Callable[[str], float]:
+    """Returns a converter to finite numbers of at least `low`."""
+
+    def convert(text: str) -> float:
+        try:
+            value = float(text)
+        except ValueError:
+            value = math.nan
+        if not (math.isfinite(value) and value >= low):
+            limit = f" of at least {low:g}" if low > -math.inf else ""
+            raise argparse.ArgumentTypeError(
+                f"found {text}; valid: a finite number{limit}"
+            )
+        return value
+
+    return convert
+
+
+def add_path(parser, *names: str, metavar: str = "FILE", **how) -> None:
+    """Adds an option or an argument whose values are paths."""
+    parser.add_argument(*names, type=Path, metavar=metavar, **how)
+
+
+def add_settings(parser, what: str) -> None:
+    """Adds `--set`."""
+    parser.add_argument(
+        "--set",
+        dest="settings",
+        metavar="FIELD=VALUE",
+        nargs="+",
+        action="extend",
+        default=[],
+        help=what,
+    )
+
+
+def add_backend(parser) -> None:
+    """Adds `--backend`."""
+    parser.add_argument(
+        "--backend",
+        metavar="NAME",
+        help="cpu, jax or warp; default: warp with an NVIDIA GPU, else cpu",
+    )
+
+
+def add_seed(parser, default: int | None = 0) -> None:
+    """Adds `--seed`."""
+    parser.add_argument(
+        "--seed", type=whole(0, MAX_SEED), default=default, help="default 0"
+    )
+
+
+def add_episodes(parser, default: int) -> None:
+    """Adds `--episodes`."""
+    parser.add_argument(
+        "--episodes", type=whole(1), default=default, help=f"default {default}"
+    )
+
+
+def add_fixed_command(parser, what: str) -> None:
+    """Adds `--command`."""
+    parser.add_argument(
+        "--command",
+        dest="commands",
+        type=number(),
+        nargs=3,
+        action="append",
+        metavar=("VX", "VY", "WZ"),
+        help=f"{what}; default: drawn as in training",
+    )
+
+
+def check_file(option: str, path: Path | None) -> None:
+    """Refuses a path to which no file can be written; nothing stays there.
+
+    Args:
+        option: that names the path, for the message.
+        path: of the file; its directories may be missing. None is not looked at.
+
+    Raises:
+        InputError: naming what is in the way.
+    """
+    if path is None:
+        return
+    if path.is_dir():
+        raise InputError(option, "", f"{path}, a directory", "a file to write")
+    _check_place(option, path, path.absolute().parent)
+
+
+def check_directory(option: str, path: Path | None) -> None:
+    """As `check_file` for a directory to write into, which may exist.
+
+    Raises:
+        InputError: naming what is in the way.
+    """
+    if path is not None:
+        _check_place(option, path, path.absolute())
+
+
+def _check_place(option: str, path: Path, directory: Path) -> None:
+    """Tries the nearest directory that exists, with a file without a name."""
+    while not directory.exists() and directory != directory.parent:
+        directory = directory.parent
+    try:
+        with tempfile.TemporaryFile(dir=directory):
+            return
+    except OSError as error:
+        found = f"{path} ({error.strerror}: {directory})"
+        raise InputError(option, "", found, "a place to write to") from error
+
+
+def backend_of(args: argparse.Namespace) -> str:
+    """Returns the physics backend that `--backend` names, or the machine's.
+
+    Raises:
+        InputError: there is no such backend, or it is not installed.
+    """
+    from envs.physics import BACKENDS, default_backend
+    from envs.physics.quiet_mjx import WARP_INSTALLED
+
+    name = args.backend or default_backend()
+    if name not in BACKENDS:
+        raise InputError("--backend", "", name, one_of(BACKENDS, name))
+    if name == "warp" and not WARP_INSTALLED:
+        valid = 'what is installed; pip install "fingers-mjx[warp]" for warp'
+        raise InputError("--backend", "", name, valid)
+    return name
+
+
+def train_config(args: argparse.Namespace, seed: int | None) -> TrainConfig:
+    """Returns the preset that `--preset` names, or the one for the backend."""
+    from fingers_mjx.ppo.config import preset
+
+    backend = backend_of(args)
+    name = args.preset or ("fast" if backend == "warp" else "cpu")
+    given: dict[str, Any] = {"backend": backend}
+    if seed is not None:
+        given["seed"] = seed
+    return dataclasses.replace(preset(name, args.task), **given)

@@ -1,0 +1,62 @@
+"""What the actions of `fingers sysid` work on: a mechanism and its records."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from envs.errors import InputError
+from fingers_mjx.cli.options import add_path
+
+if TYPE_CHECKING:
+    from sysid.logs.log import MeasuredLog
+    from sysid.mechanism import Mechanism
+
+
+def add_records(parser, *names: str, **how) -> None:
+    """Adds the logs, and `--map` for those that are bags."""
+    add_path(parser, *names, metavar="LOG", help="CSV, Parquet, MCAP, bag", **how)
+    add_path(parser, "--map", help="topics and names of a bag, as YAML")
+
+
+def add_mechanism(parser) -> None:
+    """Adds the options that name the mechanism."""
+    add_path(parser, "--hand", help="hand.yaml; default: the paper's hand")
+    add_path(parser, "--mjcf", help="another mechanism, with --drive")
+    add_path(parser, "--drive", help="drive.yaml")
+
+
+def records_of(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
+    """Reads logs; a map belongs to the bags among them.
+
+    Raises:
+        InputError: a file that is no log, or a map although there is no bag.
+    """
+    from envs.config.typed import load_yaml
+    from sysid.logs.bag import BagMap
+    from sysid.logs.read import read_log
+
+    bag_map = load_yaml(BagMap, map_file) if map_file else None
+    bags = [path.is_dir() or path.suffix == ".mcap" for path in paths]
+    return [
+        read_log(path, bag_map if is_bag or not any(bags) else None)
+        for path, is_bag in zip(paths, bags, strict=True)
+    ]
+
+
+def mechanism_of(args: argparse.Namespace) -> Mechanism:
+    """Returns the mechanism that the arguments name.
+
+    Raises:
+        InputError: an MJCF without drives, drives without an MJCF, or both kinds.
+    """
+    from envs.hand.hand_file import load_hand_file
+    from sysid.mechanism import hand_mechanism, mjcf_mechanism
+
+    if (args.mjcf is None) != (args.drive is None) or (args.mjcf and args.hand):
+        found = " ".join(f"--{n}" for n in ("hand", "mjcf", "drive") if vars(args)[n])
+        raise InputError("arguments", "", found, "--hand, or --mjcf with --drive")
+    if args.mjcf is not None:
+        return mjcf_mechanism(args.mjcf, args.drive)
+    return hand_mechanism(load_hand_file(args.hand) if args.hand else None)
