@@ -34,6 +34,8 @@ class Task:
         low, high: bounds, for all coordinates.
         steps: of the differences, where a coordinate needs its own; else 0.
         fresh: indices whose columns of the Jacobian are never shared.
+        central: whether differences are central. Forward ones share the residual at θ,
+            which biases the gradient Jᵀr where a chaotic simulation makes it noisy.
     """
 
     start: Float[np.ndarray, " n"]
@@ -44,6 +46,7 @@ class Task:
     high: Float[np.ndarray, " n"]
     steps: Float[np.ndarray, " n"] | None = None
     fresh: tuple[int, ...] = ()
+    central: bool = False
 
     def penalty(self, theta: np.ndarray) -> float:
         """Squared distance from the prior's center."""
@@ -250,20 +253,26 @@ class _State:
 
 
 def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
-    """Finds the Jacobians by forward differences."""
+    """Finds the Jacobians by forward or central differences."""
     rows, places = [], []
     for state in live:
         for i in state.task.free:
             if i in shared and i not in state.task.fresh:
                 state.columns[i] = shared[i]
                 continue
-            theta, step = state.theta.copy(), state.steps(i)
-            theta[i] += step
-            rows.append(theta)
+            step = state.steps(i)
+            for away in (step, -step) if state.task.central else (step,):
+                theta = state.theta.copy()
+                theta[i] += away
+                rows.append(theta)
             places.append((state, i, step))
-    if rows:
-        for (state, i, step), r in zip(places, residual(np.stack(rows)), strict=True):
-            state.columns[i] = (r - state.r) / step
+    found = iter(residual(np.stack(rows)) if rows else ())
+    for state, i, step in places:
+        ahead = next(found)
+        if state.task.central:
+            state.columns[i] = (ahead - next(found)) / (2.0 * step)
+        else:
+            state.columns[i] = (ahead - state.r) / step
 
 
 def _advance(residual: Residual, live: list[_State]) -> None:

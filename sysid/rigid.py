@@ -1,112 +1,242 @@
-"""Gravity and inertia around one joint along given postures, from the MuJoCo model."""
+"""Rigid-body dynamics around joints along a motion, from the MuJoCo model."""
+
+from dataclasses import dataclass
 
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
-from envs.actuator.surroundings import Gravity, Surroundings
+from envs.actuator.surroundings import Gravity
 from envs.quiet_mujoco import mujoco
-from sysid.excitation.plan import joint_address
 from sysid.mechanism import Mechanism
+
+PAYLOAD = "payload"
+"""Name of the body that carries the load, where there is one."""
 
 _EVERY = 4
 """Rows between two postures that are evaluated; joints move little in between."""
 
 
-def rigid_along(
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """What rigid-body dynamics says along n rows, for some joints of a model (v).
+
+    The torque of gravity g on a joint is m · g with the moment m = mass (a × r) of all
+    masses that it carries, and changes by m' · g with its angle.
+
+    Attributes:
+        matrix: mass matrix of the joints, with what the model gives to their drives
+            [kg·m²].
+        moment: m, in the frame of the mount [kg·m].
+        turned: m', mass a × (a × r); 0 for a slide [kg·m].
+        push: torque of the other joints' motion on each joint [N·m].
+        payload_moment, payload_shift, payload_inertia: see `Gravity`.
+        payload_kg: mass of the payload by joint.
+        gravity: in the frame of the mount [m/s²].
+    """
+
+    matrix: Float[np.ndarray, "n v v"]
+    moment: Float[np.ndarray, "n v 3"]
+    turned: Float[np.ndarray, "n v 3"]
+    push: Float[np.ndarray, "n v"]
+    payload_moment: Float[np.ndarray, "n v 3"]
+    payload_shift: Float[np.ndarray, "n v 3 3"]
+    payload_inertia: Float[np.ndarray, "n v"]
+    payload_kg: Float[np.ndarray, " v"]
+    gravity: Float[np.ndarray, "3"]
+
+    @property
+    def inertia(self) -> Float[np.ndarray, "n v"]:
+        """Inertia of each joint alone [kg·m²]."""
+        return np.diagonal(self.matrix, axis1=1, axis2=2)
+
+    @property
+    def weight(self) -> Float[np.ndarray, "n v"]:
+        """Torque of gravity on each joint, m · g [N·m]."""
+        return self.moment @ self.gravity
+
+    @property
+    def weight_slope(self) -> Float[np.ndarray, "n v"]:
+        """Its change with the joint's angle, m' · g [N·m/rad]."""
+        return self.turned @ self.gravity
+
+    def gravity_on(self, j: int) -> Gravity:
+        """Gravity's effect on one joint, row by row."""
+        rows = len(self.moment)
+        return Gravity(
+            gravity=jnp.tile(jnp.asarray(self.gravity), (rows, 1)),
+            moment=jnp.asarray(self.moment[:, j]),
+            payload_kg=jnp.full(rows, self.payload_kg[j]),
+            payload_moment=jnp.asarray(self.payload_moment[:, j]),
+            payload_shift=jnp.asarray(self.payload_shift[:, j]),
+            payload_inertia=jnp.asarray(self.payload_inertia[:, j]),
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class JointMotion:
+    """Angles of joints (v) on even rows, with their derivatives per second."""
+
+    pos: Float[np.ndarray, "n v"]
+    vel: Float[np.ndarray, "n v"]
+    acc: Float[np.ndarray, "n v"]
+
+
+def at_rest(pos: Float[np.ndarray, "n v"]) -> JointMotion:
+    """q̇ = q̈ = 0 at every one of some postures.
+
+    Args:
+        pos: q [rad].
+
+    Source:
+        Ours: postures that are passed so slowly that only gravity counts.
+    """
+    return JointMotion(pos, np.zeros_like(pos), np.zeros_like(pos))
+
+
+def mount_gravity(
+    mechanism: Mechanism, quat_w: tuple[float, float, float, float]
+) -> Float[np.ndarray, "3"]:
+    """g_v = Rᵀ g_w, gravity in the frame of a mount of the given orientation [m/s²].
+
+    Args:
+        mechanism: its model has g_w.
+        quat_w: unit quaternion of R, (w, x, y, z) [1].
+
+    Source:
+        MuJoCo documentation, "Computation", conventions of frames.
+    """
+    rotation = np.zeros(9)
+    mujoco.mju_quat2Mat(rotation, np.asarray(quat_w))
+    return rotation.reshape(3, 3).T @ mechanism.model.opt.gravity
+
+
+def bodies_along(
     mechanism: Mechanism,
-    targets: Float[np.ndarray, "n j"],
-    j: int,
-    gravity: Float[np.ndarray, "3"] | None = None,
-) -> tuple[Surroundings, Float[np.ndarray, " n"], float]:
-    """Evaluates the rigid bodies around one joint along postures.
+    joints: tuple[str, ...],
+    motion: JointMotion,
+    gravity: Float[np.ndarray, "3"],
+) -> Bodies:
+    """M(q) q̈ + c(q, q̇) = τ + m(q) · g, its terms for each joint along a motion.
+
+    The push of the others is M_ii q̈_i − Σ_k M_ik q̈_k − c_i. Postures change slowly from
+    row to row: every fourth is evaluated, the others lie on straight lines between.
 
     Args:
         mechanism: the simulation as it stands.
-        targets: angles of all joints that have a drive [rad].
-        j: number of the joint.
-        gravity: in the frame of the mount [m/s²]; the model's if not given.
+        joints: names of the joints that move; the others stay at 0.
+        motion: angles [rad], speeds [rad/s] and accelerations [rad/s²].
+        gravity: g in the frame of the mount [m/s²].
 
-    Returns:
-        What surrounds the joint at every row, the change of gravity's torque with its
-        angle [N·m/rad], and its mean inertia [kg·m²].
+    Source:
+        R. Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 5 and 6, as in
+        MuJoCo's mj_crb and mj_rne.
     """
-    model, data = mechanism.model, mujoco.MjData(mechanism.model)
-    pull = model.opt.gravity if gravity is None else gravity
-    qpos, dofs = joint_address(mechanism)
-    found: list[tuple[np.ndarray, ...]] = []
-    inertia, unit, moved = [], np.eye(model.nv)[dofs[j]], np.zeros(model.nv)
-    slopes = []
-    for posture in targets[::_EVERY]:
-        data.qpos[qpos] = posture
-        data.qpos[qpos[j]] += 1e-3
-        mujoco.mj_forward(model, data)
-        ahead = _moments(model, data, int(dofs[j]))[0]
-        data.qpos[qpos[j]] -= 1e-3
-        mujoco.mj_forward(model, data)
-        found.append(_moments(model, data, int(dofs[j])))
-        slopes.append((ahead - found[-1][0]) @ pull / 1e-3)
-        mujoco.mj_mulM(model, data, moved, unit)
-        inertia.append(moved[dofs[j]])
-    moment, payload, shift = (
-        _between(np.array(x), len(targets)) for x in zip(*found, strict=True)
-    )
-    payload_kg = model.body_mass[_carrier(model, int(dofs[j]))]
-    other = j + 1 if j + 1 < targets.shape[1] else j - 1
-    rows = len(targets)
-    world = Gravity(
-        gravity=jnp.tile(jnp.asarray(pull), (rows, 1)),
-        moment=jnp.asarray(moment),
-        payload_kg=jnp.full(rows, payload_kg),
-        payload_moment=jnp.asarray(payload),
-        payload_shift=jnp.asarray(shift),
-        payload_inertia=jnp.sum(jnp.asarray(payload) ** 2, -1),
-    )
-    around = Surroundings(
-        others_nm=None,
-        other_q=jnp.asarray(targets[:, other] if other >= 0 else np.zeros(rows)),
-        other_nm=jnp.zeros(rows),
-        gravity=world,
-    )
-    stiffness = _between(np.array(slopes), rows)
-    return around, stiffness, float(np.mean(inertia))
+    model = mechanism.model
+    ids = [model.joint(j).id for j in joints]
+    body = model.jnt_bodyid[ids]
+    payload = _payload(model, body)
+    count = len(motion.pos)
+    rows = np.unique(np.append(np.arange(0, count, _EVERY), count - 1))
+    f = _evaluated(model, ids, payload, motion, rows)
+    hinge = (model.jnt_type[ids] == int(mujoco.mjtJoint.mjJNT_HINGE))[:, None]
+    mass = model.body_subtreemass[body][:, None]
+    turn = np.cross(f["axis"], f["com"] - f["anchor"])
+    arm = np.where(hinge, np.cross(f["axis"], f["at"] - f["anchor"]), f["axis"])
+    shift = np.cross(f["axis"][:, :, None], np.swapaxes(f["frame"], 2, 3))
+    coarse = {
+        "moment": mass * np.where(hinge, turn, f["axis"]),
+        "turned": mass * np.where(hinge, np.cross(f["axis"], turn), 0.0),
+        "payload_moment": arm,
+        "payload_shift": np.where(hinge[..., None], shift, 0.0),
+        "payload_inertia": np.sum(arm**2, -1),
+        "matrix": f["m"],
+        "rate": f["rate"],
+    }
+    fine = {k: interpolated(rows, v, count) for k, v in coarse.items()}
+    m, rate = fine["matrix"], fine.pop("rate")
+    inertia = np.diagonal(m, axis1=1, axis2=2)
+    push = inertia * motion.acc - np.einsum("nij,nj->ni", m, motion.acc) - rate
+    carried = model.body_mass[payload]
+    return Bodies(payload_kg=carried, gravity=gravity, push=push, **fine)
 
 
-def gravity_torque(around: Surroundings) -> Float[np.ndarray, " n"]:
-    """Returns the torque of gravity on the joint at every row [N·m]."""
-    world = around.gravity
-    assert world is not None
-    return np.sum(np.asarray(world.moment) * np.asarray(world.gravity), -1)
+def _evaluated(
+    model: mujoco.MjModel,
+    ids: list[int],
+    payload: Int[np.ndarray, " v"],
+    motion: JointMotion,
+    rows: Int[np.ndarray, " k"],
+) -> dict[str, np.ndarray]:
+    """Mass matrix, axes, places and Coriolis torques at some rows."""
+    data = mujoco.MjData(model)
+    adr, dof = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
+    matrix = np.zeros((model.nv, model.nv))
+    found: dict[str, list] = {
+        k: [] for k in ("m", "axis", "anchor", "com", "at", "frame", "rate")
+    }
+    for k in rows:
+        data.qpos[adr], data.qvel[dof] = motion.pos[k], motion.vel[k]
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_crb(model, data)
+        mujoco.mj_fullM(model, data, matrix)
+        found["m"].append(matrix[np.ix_(dof, dof)])
+        found["axis"].append(data.xaxis[ids])
+        found["anchor"].append(data.xanchor[ids])
+        found["com"].append(data.subtree_com[model.jnt_bodyid[ids]])
+        found["at"].append(data.xipos[payload])
+        found["frame"].append(data.xmat[payload].reshape(-1, 3, 3))
+        found["rate"].append(
+            _coriolis(model, data)[dof] if len(dof) > 1 else np.zeros(1)
+        )
+    return {key: np.array(values) for key, values in found.items()}
 
 
-def _between(values: np.ndarray, rows: int) -> np.ndarray:
-    """Fills the rows between those that were evaluated; the last value stays."""
-    place = np.minimum(np.arange(rows) / _EVERY, len(values) - 1.0)
-    low = np.minimum(place.astype(int), max(len(values) - 2, 0))
-    share = (place - low).reshape(-1, *[1] * (values.ndim - 1))
-    high = np.minimum(low + 1, len(values) - 1)
-    return (1.0 - share) * values[low] + share * values[high]
+def interpolated(
+    rows: Int[np.ndarray, " k"], values: Float[np.ndarray, "k ..."], count: int
+) -> Float[np.ndarray, "n ..."]:
+    """y_t = (1 − s) y_a + s y_b with s = (t − a) / (b − a), between rows a ≤ t ≤ b.
 
+    Args:
+        rows: numbers of the steps that have values, increasing [steps].
+        values: of any unit.
+        count: number n of steps; after the last row its value stays.
 
-def _carrier(model: mujoco.MjModel, dof: int) -> int:
-    """Returns the last body of a joint's chain, which would carry a payload."""
-    body = int(model.dof_bodyid[dof])
-    for child in range(body + 1, model.nbody):
-        if model.body_parentid[child] == body:
-            body = child
-    return body
-
-
-def _moments(model: mujoco.MjModel, data: mujoco.MjData, dof: int):
-    """Returns moments a × r of what a joint carries and of its payload.
-
-    That is: of all masses [kg·m], of a payload of 1 kg [m], and the change of the
-    latter by a shift along the axes of its body.
+    Source:
+        Textbook linear interpolation.
     """
-    jacobian, turns = np.zeros((3, model.nv)), np.zeros((3, model.nv))
-    body, carrier = int(model.dof_bodyid[dof]), _carrier(model, dof)
-    mujoco.mj_jacSubtreeCom(model, data, jacobian, body)
-    moment = model.body_subtreemass[body] * jacobian[:, dof]
-    mujoco.mj_jacBodyCom(model, data, jacobian, turns, carrier)
-    axis, frame = turns[:, dof], data.xmat[carrier].reshape(3, 3)
-    return moment, jacobian[:, dof].copy(), np.cross(axis, frame.T)
+    steps = np.arange(count)
+    right = np.clip(np.searchsorted(rows, steps, "left"), 1, len(rows) - 1)
+    share = (steps - rows[right - 1]) / (rows[right] - rows[right - 1])
+    share = np.minimum(share, 1.0).reshape(-1, *[1] * (values.ndim - 1))
+    return (1.0 - share) * values[right - 1] + share * values[right]
+
+
+def _coriolis(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """Torque of velocities alone on all joints."""
+    kept, model.opt.gravity[:] = model.opt.gravity.copy(), 0.0
+    result = np.zeros(model.nv)
+    try:
+        mujoco.mj_comVel(model, data)
+        mujoco.mj_rne(model, data, 0, result)
+    finally:
+        model.opt.gravity[:] = kept
+    return result
+
+
+def _payload(model: mujoco.MjModel, body: np.ndarray) -> Int[np.ndarray, " v"]:
+    """Returns for every joint the body that carries its load.
+
+    The body named `payload` where there is one, else the last body of the joint's
+    chain.
+    """
+    named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, PAYLOAD)
+    result = []
+    for start in body:
+        below = [start]
+        for i in range(start + 1, model.nbody):
+            if model.body_parentid[i] in below:
+                below.append(i)
+        result.append(named if named in below else below[-1])
+    return np.array(result)

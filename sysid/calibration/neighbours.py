@@ -20,9 +20,8 @@ from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
-from envs.quiet_mujoco import mujoco
-from sysid.excitation.plan import joint_address
 from sysid.mechanism import JointDrive, Mechanism
+from sysid.rigid import interpolated
 
 _COUPLED = 0.02
 """Share of its own inertia from which on a coupling counts."""
@@ -54,7 +53,7 @@ class Neighbours:
 
 def neighbours_along(
     mechanism: Mechanism,
-    postures: Float[np.ndarray, "c j"],
+    matrices: Float[np.ndarray, "c j j"],
     every: int,
     targets: dict[str, Float[np.ndarray, " m"]],
     joint: str,
@@ -64,15 +63,14 @@ def neighbours_along(
 
     Args:
         mechanism: the simulation as it stands.
-        postures: angles of all joints, once in `every` steps [rad].
-        every: steps between two postures.
-        targets: targets of all joints that have any, at every step [rad].
+        matrices: mass matrices of all joints, once in `every` steps [kg·m²].
+        every: steps between two matrices.
+        targets: targets of all joints at every step [rad].
         joint: whose neighbours.
         dt: step [s].
     """
     names = mechanism.joints
     j, steps = names.index(joint), len(targets[joint])
-    matrices = _inertia(mechanism, postures)
     share = np.max(np.abs(matrices[:, j]), 0) / np.mean(matrices[:, j, j])
     others = [o for o in range(len(names)) if o != j and share[o] > _COUPLED]
     drives = [mechanism.drives[names[o]] for o in others]
@@ -80,52 +78,32 @@ def neighbours_along(
     coupling = matrices[:, others, j]
     inverse = np.linalg.inv(matrices[:, others][:, :, others] + 0.5 * dt * np.diag(kd))
     moved = np.einsum("tab,tb->ta", inverse, coupling)
-    rest = np.take(np.mean(postures, 0), others)
     commands = [
-        _command(drive, targets[names[o]], dt) if names[o] in targets
-        else np.full(steps, angle)
-        for o, drive, angle in zip(others, drives, rest, strict=True)
-    ]  # fmt: skip
+        _command(drive, targets[names[o]], dt)
+        for o, drive in zip(others, drives, strict=True)
+    ]
+    rows = every * np.arange(len(matrices))
+    own, along, left, inverse = (
+        interpolated(rows, x, steps)
+        for x in (matrices[:, j, j], moved, -np.sum(moved * coupling, 1), inverse)
+    )
     return Neighbours(
-        inertia=_fine(matrices[:, j, j], every, steps),
-        moved=_fine(moved, every, steps),
-        left=_fine(-np.sum(moved * coupling, 1), every, steps),
-        inverse=_fine(inverse, every, steps),
+        inertia=own,
+        moved=along,
+        left=left,
+        inverse=inverse,
         command=np.stack(commands, 1) if commands else np.zeros((steps, 0)),
         kp=np.array([drive.kp.value for drive in drives]),
         kd=kd,
     )
 
 
-def _inertia(
-    mechanism: Mechanism, postures: Float[np.ndarray, "c j"]
-) -> Float[np.ndarray, "c j j"]:
-    """Mass matrices of all joints that have a drive."""
-    model, data = mechanism.model, mujoco.MjData(mechanism.model)
-    qpos, dofs = joint_address(mechanism)
-    found, column = np.zeros((len(postures), len(dofs), len(dofs))), np.zeros(model.nv)
-    for matrix, posture in zip(found, postures, strict=True):
-        data.qpos[qpos] = posture
-        mujoco.mj_forward(model, data)
-        for row, dof in zip(matrix, dofs, strict=True):
-            mujoco.mj_mulM(model, data, column, np.eye(model.nv)[dof])
-            row[:] = column[dofs]
-    return found
-
-
-def _fine(values: np.ndarray, every: int, steps: int) -> np.ndarray:
-    """Values of every step, linear between those of the postures."""
-    place = np.minimum(np.arange(steps) / every, len(values) - 1.0)
-    low = np.minimum(place.astype(int), max(len(values) - 2, 0))
-    share = (place - low).reshape(-1, *[1] * (values.ndim - 1))
-    high = np.minimum(low + 1, len(values) - 1)
-    return (1.0 - share) * values[low] + share * values[high]
-
-
 def _command(
     drive: JointDrive, held: Float[np.ndarray, " m"], dt: float
 ) -> Float[np.ndarray, " m"]:
     """Command of a servo behind its delay, low-pass and speed limit."""
+    if np.ptp(held) == 0.0:
+        return held
     model = [
         (
             CATALOGUE[name],

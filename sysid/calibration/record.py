@@ -6,16 +6,15 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from envs.errors import InputError
-from envs.quiet_mujoco import mujoco
 from sysid.calibration.neighbours import Neighbours, neighbours_along
 from sysid.excitation.plan import rest_posture
 from sysid.logs.log import MeasuredLog
 from sysid.logs.timing import continuous_parts
 from sysid.mechanism import Mechanism
-from sysid.rigid import gravity_torque, rigid_along
+from sysid.rigid import at_rest, bodies_along, mount_gravity
 
 STEP_S, BLOCK_S = 0.001, 1.0
-_EVERY, _SPARSE = 10, 4
+_EVERY = 10
 _SETTLE_S = 0.5
 _LEAST_ROWS = 50
 
@@ -81,20 +80,31 @@ def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:
         found = f"{int(valid[:, 0].sum())} readings after {_SETTLE_S:g} s"
         raise InputError(log.source, f"pos.{joint}", found, f"at least {_LEAST_ROWS}")
     grid = np.arange(int(t_s[-1] / STEP_S) + 2) * STEP_S
-    postures = _postures(mechanism, log, grid)
-    load, slope = _gravity(mechanism, log, joint, postures, grid)
-    held = {j: _held(log, f"cmd.{j}", grid) for j in log.header.joints}
-    sparse = postures[::_SPARSE]
-    every = _SPARSE * _EVERY
+    postures = _postures(mechanism, log, grid[::_EVERY])
+    pull = mount_gravity(mechanism, log.header.palm_quat_w)
+    bodies = bodies_along(mechanism, mechanism.joints, at_rest(postures), pull)
+    j = mechanism.joints.index(joint)
+    weight, slope = (
+        np.interp(grid, grid[::_EVERY], x[:, j])
+        for x in (bodies.weight, bodies.weight_slope)
+    )
+    held = {
+        name: _held(log, f"cmd.{name}", grid)
+        if name in log.header.joints
+        else np.full(len(grid), angle)
+        for name, angle in zip(mechanism.joints, postures[0], strict=True)
+    }
     return Record(
         t_s=t_s,
         measured=measured,
         valid=valid,
         held=held[joint],
-        load=load,
+        load=weight,
         load_slope=slope,
         angle=_between(log, f"pos.{joint}", grid),
-        neighbours=neighbours_along(mechanism, sparse, every, held, joint, STEP_S),
+        neighbours=neighbours_along(
+            mechanism, bodies.matrix, _EVERY, held, joint, STEP_S
+        ),
     )
 
 
@@ -132,10 +142,9 @@ def _between(log: MeasuredLog, name: str, grid: np.ndarray) -> np.ndarray:
 
 
 def _postures(
-    mechanism: Mechanism, log: MeasuredLog, grid: np.ndarray
+    mechanism: Mechanism, log: MeasuredLog, coarse: np.ndarray
 ) -> Float[np.ndarray, "c j"]:
-    """Angles of all joints, once in `_EVERY` steps; others rest."""
-    coarse = grid[::_EVERY]
+    """Angles of all joints at some times; those that were not measured rest."""
     postures = np.tile(rest_posture(mechanism), (len(coarse), 1))
     for name in log.header.joints:
         if name not in mechanism.joints:
@@ -144,21 +153,3 @@ def _postures(
         column = mechanism.joints.index(name)
         postures[:, column] = _between(log, f"pos.{name}", coarse)
     return postures
-
-
-def _gravity(
-    mechanism: Mechanism,
-    log: MeasuredLog,
-    joint: str,
-    postures: np.ndarray,
-    grid: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Gravity's torque at every step, with its slope."""
-    rotation = np.zeros(9)
-    mujoco.mju_quat2Mat(rotation, np.asarray(log.header.palm_quat_w))
-    pull = rotation.reshape(3, 3).T @ mechanism.model.opt.gravity
-    j = mechanism.joints.index(joint)
-    around, slope, _ = rigid_along(mechanism, postures, j, pull)
-    coarse = grid[::_EVERY]
-    load, slope = (np.interp(grid, coarse, x) for x in (gravity_torque(around), slope))
-    return load, slope

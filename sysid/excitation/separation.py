@@ -30,7 +30,7 @@ from envs.actuator.surroundings import Surroundings
 from sysid.excitation.check import STEP_S
 from sysid.excitation.plan import Plan
 from sysid.mechanism import JointDrive, Mechanism
-from sysid.rigid import gravity_torque, rigid_along
+from sysid.rigid import at_rest, bodies_along
 
 NEEDED_NAT = 6.0
 """Evidence from which on an effect counts as seen, or as told apart."""
@@ -152,7 +152,8 @@ class _Bench:
 
     Attributes:
         targets: at every row [rad].
-        stiffness: change of gravity's torque with the angle [N·m/rad].
+        weight: torque of gravity [N·m].
+        stiffness: its change with the angle [N·m/rad].
         around: gravity and the neighbour at every row.
         inertia: of the joint [kg·m²].
         kp, kd: gains.
@@ -160,6 +161,7 @@ class _Bench:
     """
 
     targets: Float[np.ndarray, " n"]
+    weight: Float[np.ndarray, " n"]
     stiffness: Float[np.ndarray, " n"]
     around: Surroundings
     inertia: float
@@ -177,12 +179,21 @@ def _bench(mechanism: Mechanism, plan: Plan, joint: str) -> _Bench:
             start, stop = segment.start_s * plan.rate_hz, segment.stop_s * plan.rate_hz
             rows[round(start) : round(stop)] = True
     targets, drive = plan.targets[rows], mechanism.drives[joint]
-    around, stiffness, inertia = rigid_along(mechanism, targets, j)
+    pull = mechanism.model.opt.gravity
+    bodies = bodies_along(mechanism, plan.joints, at_rest(targets), pull)
+    other = j + 1 if j + 1 < targets.shape[1] else j - 1
+    beside = targets[:, other] if other >= 0 else np.zeros(len(targets))
+    around = Surroundings(
+        other_q=jnp.asarray(beside),
+        other_nm=jnp.zeros(len(targets)),
+        gravity=bodies.gravity_on(j),
+    )
     return _Bench(
         targets=targets[:, j],
-        stiffness=stiffness,
+        weight=bodies.weight[:, j],
+        stiffness=bodies.weight_slope[:, j],
         around=around,
-        inertia=inertia,
+        inertia=float(np.mean(bodies.inertia[:, j])),
         kp=drive.kp.value,
         kd=drive.kd.value,
         repeat=max(round(1.0 / plan.rate_hz / STEP_S), 1),
@@ -214,7 +225,7 @@ def _sizes(drive: JointDrive, kinds, bench: _Bench) -> dict[str, dict]:
     """All effects one by one, each at a size that such a joint may have."""
     rest = _base(drive, kinds)
     speed = np.max(np.abs(np.diff(bench.targets))) / bench.repeat / STEP_S
-    torque = max(np.max(np.abs(gravity_torque(bench.around))), 0.01 * bench.kp)
+    torque = max(np.max(np.abs(bench.weight)), 0.01 * bench.kp)
     sizes = {}
     for name, kind in kinds.items():
         values = dict(rest[name])
@@ -259,7 +270,7 @@ def _stacked(candidates: list[dict]):
 
 def _simulate(names: tuple[str, ...], stacked, bench: _Bench):
     """Returns readings and efforts of all candidates (candidates, rows, 2)."""
-    rows = (bench.targets, gravity_torque(bench.around), bench.stiffness, bench.around)
+    rows = (bench.targets, bench.weight, bench.stiffness, bench.around)
     rows = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), rows)
     figures = (bench.inertia, bench.kp, bench.kd)
     return _run(names, bench.repeat, stacked, rows, figures)

@@ -112,6 +112,7 @@ class Walk:
             low=-BOUND * same,
             high=BOUND * same,
             steps=_STEP * same,
+            central=True,
         )
         return fit_all(self.residuals, [task], rounds)[0]
 

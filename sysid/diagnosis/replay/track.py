@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from envs.errors import InputError, one_of
-from sysid.bodies import bodies_along
 from sysid.diagnosis.measured.checks import check_records
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.measured.segments import (
@@ -22,6 +21,7 @@ from sysid.diagnosis.replay.residuals import BAND_STEPS, EVERY, Track, sample_ro
 from sysid.diagnosis.replay.timing_uncertainty import sampling_doubt, timing_doubt
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
+from sysid.rigid import JointMotion, bodies_along, mount_gravity
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +104,11 @@ def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointT
         longest = max(float(np.ptp(log.t_s)) for log in logs)
         valid = "at least 1.5 s of readings without a jump of the clock"
         raise InputError(logs[0].source, "t", f"{longest:.3g} s in pieces", valid)
-    bodies = [bodies_along(mechanism, logs[p.log], p, joints) for p in pieces]
+    pulls = [mount_gravity(mechanism, log.header.palm_quat_w) for log in logs]
+    bodies = [
+        bodies_along(mechanism, joints, JointMotion(p.pos, p.vel, p.acc), pulls[p.log])
+        for p in pieces
+    ]
     return [
         _track(mechanism, logs, pieces, bodies, j, step_s) for j in range(len(joints))
     ]
