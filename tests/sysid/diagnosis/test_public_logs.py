@@ -1,6 +1,7 @@
 """The diagnosis on public measurements, whose effects are known.
 
-FINGERS_REAL_DATA names the folder that has `emps` and the others; see docs/guides/logs.md.
+FINGERS_REAL_DATA names the folder that has `emps` and the others; see
+docs/guides/logs.md.
 """
 
 import os
