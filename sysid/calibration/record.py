@@ -9,7 +9,7 @@ from envs.errors import InputError
 from sysid.calibration.neighbours import Neighbours, neighbours_along
 from sysid.excitation.plan import rest_posture
 from sysid.logs.log import MeasuredLog
-from sysid.logs.timing import continuous_parts
+from sysid.logs.timing import timing
 from sysid.mechanism import Mechanism
 from sysid.rigid import at_rest, bodies_along, mount_gravity
 
@@ -110,7 +110,7 @@ def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:
 
 def _settled(t_s: Float[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
     """Returns which rows are long after the start and after the last gap."""
-    starts = [t_s[part][0] for part in continuous_parts(t_s)]
+    starts = [t_s[part][0] for part in timing(t_s).parts]
     since = t_s - np.array(starts)[np.searchsorted(starts, t_s, "right") - 1]
     return since > _SETTLE_S
 

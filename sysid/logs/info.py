@@ -4,7 +4,6 @@ import numpy as np
 
 from sysid.logs.columns import quantity_of
 from sysid.logs.log import MeasuredLog
-from sysid.logs.timing import column_timing
 
 
 def info_lines(log: MeasuredLog) -> list[str]:
@@ -30,7 +29,7 @@ def info_lines(log: MeasuredLog) -> list[str]:
 def _column_line(log: MeasuredLog, name: str) -> str:
     """Describes one column: range, unit, rate, and all that is irregular."""
     _, values = log.samples(name)
-    found = column_timing(log, name)
+    found = log.timing(name)
     unit = log.header.units[quantity_of(name)]
     counts = {
         "missing": int(log.missing(name).sum()),

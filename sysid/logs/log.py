@@ -1,9 +1,9 @@
-"""Measured logs: what a hand, or any position-controlled joint, was told and did.
+"""Measured logs: the targets and readings of a hand, or any position-controlled joint.
 
 A log keeps what was recorded, as it was recorded. A reading that is missing is NaN in
 its row; rows stand in the order of the recording at their own times; gaps, repeated and
-backward times stay, and `sysid.logs.timing` reports them. Nothing is filled in, sorted,
-or converted.
+backward times stay, and `MeasuredLog.timing` reports them. Nothing is filled in,
+sorted, or converted.
 """
 
 import dataclasses
@@ -26,6 +26,7 @@ from sysid.logs.columns import (
     quantity_of,
     standard_units,
 )
+from sysid.logs.timing import Timing, timing
 
 SCHEMA = 1
 
@@ -90,6 +91,7 @@ class MeasuredLog:
     columns: Mapping[str, Float[np.ndarray, " n"]]
     key: np.ndarray | None = None
     source: str = "log"
+    _timings: dict[str, Timing] = field(default_factory=dict, init=False, repr=False)
 
     def __post_init__(self) -> None:
         check_columns(self.source, self.columns, self.header.joints)
@@ -154,6 +156,51 @@ class MeasuredLog:
         """Returns times [s] and values of the rows that have a reading."""
         kept = ~self.missing(name)
         return self.t_s[kept], self.column(name)[kept]
+
+    def timing(self, name: str) -> Timing:
+        """Describes when one column was read, once; its missing rows are no samples.
+
+        Raises:
+            InputError: no such column, or fewer than two readings at different times.
+        """
+        if name not in self._timings:
+            t_s, _ = self.samples(name)
+            if len(t_s) < 2:
+                found = f"{len(t_s)} reading"
+                raise InputError(self.source, name, found, "at least two")
+            self._timings[name] = timing(t_s, self.source)
+        return self._timings[name]
+
+    def resampled(
+        self, name: str, t_s: Float[np.ndarray, " m"]
+    ) -> Float[np.ndarray, " m"]:
+        """y(t) = (1 − s) y_a + s y_b between neighbours a, b; NaN outside of parts.
+
+        Of several readings at one time the last one counts.
+
+        Args:
+            name: column.
+            t_s: times to read it at [s].
+
+        Raises:
+            InputError: no such column, or times that run backward, where "the value at
+                time t" has no meaning.
+
+        Source:
+            Textbook linear interpolation, but never across a gap of the record.
+        """
+        times, values = self.samples(name)
+        found = self.timing(name)
+        if found.backward.size:
+            when = f"a step back at {times[found.backward[0]]:.6g} s"
+            raise InputError(self.source, "t", when, "times that never run backward")
+        result = np.full(len(t_s), np.nan)
+        for part in found.parts:
+            last = np.append(np.diff(times[part]) > 0.0, True)
+            part_t, part_v = times[part][last], values[part][last]
+            inside = (t_s >= part_t[0]) & (t_s <= part_t[-1])
+            result[inside] = np.interp(t_s[inside], part_t, part_v)
+        return result
 
     @property
     def sha256(self) -> str:

@@ -20,7 +20,6 @@ from sysid.diagnosis.measured.resampling import (
     smoothed,
 )
 from sysid.logs.log import MeasuredLog
-from sysid.logs.timing import column_timing, continuous_parts
 from sysid.mechanism import JointDrive
 
 GRID_S = 0.004
@@ -96,7 +95,7 @@ def _period_s(log: MeasuredLog, name: str) -> float:
 
     A grid that is too wide by 0.2 % does not meet the repeats of a motion.
     """
-    median = column_timing(log, name).period_s
+    median = log.timing(name).period_s
     steps = np.diff(log.samples(name)[0])
     return float(np.mean(steps[np.abs(steps - median) < 0.5 * median]))
 
@@ -116,7 +115,7 @@ def pieces_of(
         Its pieces, without those that are too short.
     """
     pieces = []
-    periods = [column_timing(log, f"pos.{joint}").period_s for joint in drives]
+    periods = [log.timing(f"pos.{joint}").period_s for joint in drives]
     every = max(1, round(step_s / min(periods)))
     for start, stop in _spans(log, f"pos.{next(iter(drives))}"):
         if stop - start >= MIN_PIECE_S:
@@ -136,12 +135,12 @@ def pieces_of(
 def _spans(log: MeasuredLog, name: str) -> list[tuple[float, float]]:
     """Returns (first, last) time of every stretch in which the clock runs evenly."""
     t_s, _ = log.samples(name)
-    found = column_timing(log, name)
+    found = log.timing(name)
     if found.backward.size > MAX_BACKWARD * len(t_s):
         share = f"{found.backward.size} of {len(t_s)} steps into the past"
         raise InputError(log.source, "t", share, "times that increase")
     spans = []
-    for part in continuous_parts(t_s):
+    for part in found.parts:
         times = t_s[part]
         gaps = np.flatnonzero(np.diff(times) > MAX_FILL_S + found.period_s)
         edges = [0, *(gaps + 1), len(times)]
@@ -166,7 +165,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
     names = {"cmd": f"cmd.{joint}", "pos": f"pos.{joint}"}
     names |= {"effort": f"{drive.effort}.{joint}", "ext": f"ext.{joint}"}
     names = {key: name for key, name in names.items() if name in log.columns}
-    period = column_timing(log, names["pos"]).period_s
+    period = log.timing(names["pos"]).period_s
     fine_s = step_s / every
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
     columns, valid = {}, np.ones(len(fine), bool)

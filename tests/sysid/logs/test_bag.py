@@ -8,7 +8,6 @@ from rosbags.typesys import Stores, get_typestore
 from envs.errors import InputError
 from sysid.logs.bag import BagMap
 from sysid.logs.read import read_log
-from sysid.logs.timing import column_timing
 
 TYPES = get_typestore(Stores.ROS2_HUMBLE)
 MSG = TYPES.types
@@ -83,8 +82,8 @@ def test_a_bag_is_read_row_by_row(tmp_path, plugin):
     assert times == pytest.approx(np.arange(20) * 0.01)
     assert targets == pytest.approx(np.arange(20) * 0.2)
     assert log.samples("cur.j2")[1] == pytest.approx(np.full(40, -0.5))
-    assert column_timing(log, "pos.j1").period_s == pytest.approx(0.005)
-    assert column_timing(log, "pos.j1").regular
+    assert log.timing("pos.j1").period_s == pytest.approx(0.005)
+    assert log.timing("pos.j1").regular
     assert log.samples("gyro.y")[1] == pytest.approx(np.full(10, 0.2))
     assert log.samples("base.qx")[1] == pytest.approx(np.full(10, TURN))
     assert not any(name.startswith("vel.") for name in log.columns)

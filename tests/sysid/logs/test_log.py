@@ -4,7 +4,7 @@ from support.sysid_logs import small_log
 
 from envs.errors import InputError
 from sysid.logs.log import LogHeader, MeasuredLog, make_log
-from sysid.logs.timing import column_timing, continuous_parts, resampled, timing
+from sysid.logs.timing import timing
 
 ROWS = 4
 T = np.arange(ROWS) * 0.01
@@ -111,7 +111,7 @@ def test_timing_reports_what_is_irregular():
     assert not found.regular
     assert timing(T).regular
     assert timing(T).jitter_s == pytest.approx(0.0, abs=1e-12)
-    assert continuous_parts(t_s) == [slice(0, 5), slice(5, 7), slice(7, 9)]
+    assert found.parts == [slice(0, 5), slice(5, 7), slice(7, 9)]
 
 
 def test_jitter_is_the_deviation_of_the_steps():
@@ -127,15 +127,16 @@ def test_a_clock_that_stands_has_no_period():
 
 def test_missing_rows_make_gaps_in_their_column_only():
     log = small_log()
-    assert column_timing(log, "tau.knee").gaps.size == 2
-    assert column_timing(log, "pos.knee").gaps.size == 1
+    assert log.timing("tau.knee").gaps.size == 2
+    assert log.timing("pos.knee").gaps.size == 1
+    assert log.timing("pos.knee") is log.timing("pos.knee")
 
 
 def test_resampling_invents_nothing():
     t_s = np.array([0.0, 0.01, 0.02, 0.08, 0.09])
     log = make_log(("knee",), t_s, {"cmd.knee": t_s, "pos.knee": 2.0 * t_s})
     asked = np.array([-0.001, 0.0, 0.005, 0.02, 0.05, 0.085, 0.1])
-    found = resampled(log, "pos.knee", asked)
+    found = log.resampled("pos.knee", asked)
     assert np.isnan(found).tolist() == [True, False, False, False, True, False, True]
     assert found[[1, 2, 3, 5]] == pytest.approx([0.0, 0.01, 0.04, 0.17])
 
@@ -144,4 +145,4 @@ def test_resampling_a_backward_clock_is_refused():
     t_s = np.array([0.0, 0.01, 0.02, 0.005])
     log = make_log(("knee",), t_s, KNEE)
     with pytest.raises(InputError, match=r"step back at 0\.02 s"):
-        resampled(log, "pos.knee", T)
+        log.resampled("pos.knee", T)
