@@ -12,17 +12,12 @@ from envs.base import State
 from envs.hand.effect_parts import friction_rows
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.spec import HandSpec
+from envs.hand.spec import JOINT_QPOS, HandSpec
 from envs.hand.stance import Stance, stance_of
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample, flatten, push, start_history
-from envs.physics import (
-    ModelFields,
-    Physics,
-    PhysicsOutput,
-    PhysicsState,
-    make_physics,
-)
+from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
+from envs.physics.backends import make_physics
 from envs.physics.room import overflow_metrics
 from envs.plant import make_plant
 from envs.randomize import draw_variation, model_fields
@@ -71,7 +66,7 @@ class HandEnv:
             )
 
         substeps = round(self.dt / PHYSICS_DT_S)
-        self.plant = make_plant(make, self.hand, self.stance, substeps)
+        self.plant = make_plant(make, model, self.hand, self.stance, substeps)
         first = jax.eval_shape(self.reset, jax.random.key(0))
         self._observation_size = {k: x.shape[-1] for k, x in first.obs.items()}
 
@@ -213,7 +208,7 @@ class HandEnv:
         carried = self.task.begin_episode(key, world, data) | {
             "world": world,
             "steps": jnp.zeros((), jnp.int32),
-            "drive": self.plant.begin_drive(target, data),
+            "drive": self.plant.drive.begin(target, data.qpos[JOINT_QPOS]),
             "target": target,
             "action": action,
         }
@@ -264,7 +259,8 @@ class HandEnv:
         """
         reference, noise = jnp.array(self.stance.joint_pos_rad), self.config.randomize
         effects = self.plant.effects
-        joints = self.plant.joint_reading(carried["drive"], data) - reference
+        drive, q = self.plant.drive, data.qpos[JOINT_QPOS]
+        joints = drive.reading(carried["drive"], q) - reference
         imu = effects.sense(imu_of(data, effects.down_w))
         told = sense(noise, carried["world"], joints, imu, carried["action"])
         return told.replace(inputs=self.task.inputs(carried, told))

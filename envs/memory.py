@@ -5,8 +5,7 @@ from typing import Any
 import flax.struct
 from jaxtyping import Array, Float, Int
 
-from envs.hand.drive.chain import ChainState
-from envs.hand.drive.servo import DriveState
+from envs.hand.drive.drive import DriveState
 from envs.observations import Sample
 from envs.randomize import Variation
 from rewards import Schedule
@@ -42,7 +41,7 @@ class Memory:
     Attributes:
         world: what survives a reset.
         steps: control steps of this episode.
-        drive: delay line and filters of the actuator chain; with effects, all of it.
+        drive: state of the drive, see `envs.hand.drive`.
         target: joint targets [rad] after the last action.
         action: last clipped policy output.
         history: the last eight samples of the observation.
@@ -53,7 +52,7 @@ class Memory:
 
     world: PerWorldState
     steps: Int[Array, "*b"]
-    drive: DriveState | ChainState
+    drive: DriveState
     target: Float[Array, "*b 20"]
     action: Float[Array, "*b 20"]
     history: Sample

@@ -12,25 +12,11 @@ import numpy as np
 from jaxtyping import Array, Bool, Float
 
 from envs.errors import InputError
-from envs.hand.drive.chain import (
-    Chain,
-    ChainState,
-    begin_chain,
-    chain_substep,
-    make_chain,
-    read_load,
-)
+from envs.hand.drive.drive import Drive, DriveState, make_drive
 from envs.hand.drive.model_effects import SceneEffects, make_scene_effects
-from envs.hand.drive.servo import (
-    DriveParams,
-    DriveState,
-    command_sequence,
-    drive_params,
-    init_drive_state,
-)
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.spec import HAND_NQ, JOINT_QPOS, HandSpec, hand_spec
+from envs.hand.spec import HAND_NQ, HandSpec, hand_spec
 from envs.hand.stance import Stance
 from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
 
@@ -44,12 +30,10 @@ class Plant:
         spec: indices of the model.
         joint_range: limits of the joints and of their targets [rad].
         physics: backend that steps it.
-        drive: parameters of the command path.
+        drive: what is between the targets and the physics.
         stance: settled stance of the hand.
         rest: the stance with the sensors that belong to it.
         n_substeps: physics steps of a control step.
-        chain: the drive of a hand with effects of joints, in the place of `drive` and
-            of MuJoCo's servos; none for other hands.
         effects: effects that act by model and IMU.
     """
 
@@ -57,11 +41,10 @@ class Plant:
     spec: HandSpec
     joint_range: Float[Array, "20 2"]
     physics: Physics
-    drive: DriveParams
+    drive: Drive
     stance: Stance
     rest: PhysicsOutput
     n_substeps: int
-    chain: Chain | None
     effects: SceneEffects
 
     def next_target(
@@ -87,87 +70,38 @@ class Plant:
         self,
         fields: ModelFields,
         state: PhysicsState,
-        drive: DriveState | ChainState,
+        drive: DriveState,
         target: Float[Array, "20"],
-    ) -> tuple[DriveState | ChainState, PhysicsOutput, Bool[Array, ""]]:
-        """Advances one control step with the joint targets held.
+    ) -> tuple[DriveState, PhysicsOutput, Bool[Array, ""]]:
+        """Advances one control step with the targets held: s' = f(s, target; fields).
 
         Args:
             fields: what the model of this world differs in.
-            state: the state before.
+            state: the state before [m, rad, m/s, rad/s].
             drive: the drive's state before.
             target: joint targets [rad].
 
         Returns:
             The drive's state, the result, and whether the step was invalid; see
             `replace_invalid`.
+
+        Source:
+            MuJoCo documentation, Computation; `Drive` for what is before the physics.
         """
-        if isinstance(drive, ChainState):
-            drive, output = self._step_chained(fields, state, drive, target)
-        else:
-            drive, commands = self.commands(drive, target)
-            output = self.physics.step(fields, state, commands)
-        return drive, *self.replace_invalid(output)
 
-    def begin_drive(
-        self, target: Float[Array, "20"], state: PhysicsState
-    ) -> DriveState | ChainState:
-        """The drive at rest: `target` [rad] has been sent for long."""
-        if self.chain is not None:
-            return begin_chain(self.chain, target, state.qpos[JOINT_QPOS])
-        return init_drive_state(target, self.drive, PHYSICS_DT_S)
-
-    def commands(
-        self, drive: DriveState, target: Float[Array, "20"]
-    ) -> tuple[DriveState, Float[Array, "n 20"]]:
-        """Commands of a control step to MuJoCo's servos, one per substep [rad]."""
-        return command_sequence(
-            self.drive, drive, target, PHYSICS_DT_S, self.n_substeps
-        )
-
-    def begin_substep(
-        self,
-        fields: ModelFields,
-        state: PhysicsState,
-        drive: ChainState,
-        target: Float[Array, "20"],
-    ) -> tuple[ChainState, ModelFields]:
-        """Runs the chain for one substep; returns the fields that apply its torques."""
-        assert self.chain is not None
-        return chain_substep(self.chain, fields, self.mj_model, drive, state, target)
-
-    def end_substep(self, drive: ChainState, output: PhysicsOutput) -> ChainState:
-        """Tells the chain what the physics made of a substep."""
-        assert self.chain is not None
-        return read_load(self.chain, self.spec, drive, output)
-
-    def joint_reading(
-        self, drive: DriveState | ChainState, state: PhysicsState
-    ) -> Float[Array, "20"]:
-        """Joint angles that the encoders tell the host [rad]."""
-        if isinstance(drive, ChainState):
-            return drive.reading
-        return state.qpos[JOINT_QPOS]
-
-    def _step_chained(
-        self,
-        fields: ModelFields,
-        state: PhysicsState,
-        drive: ChainState,
-        target: Float[Array, "20"],
-    ) -> tuple[ChainState, PhysicsOutput]:
-        """A control step in which the chain runs between the substeps."""
-
-        def substep(carry: Any, _: None) -> tuple[Any, Array]:
+        def exchange(carry: Any, _: None) -> tuple[Any, Array]:
             drive, output = carry
-            drive, applied = self.begin_substep(fields, output.state, drive, target)
-            output = self.physics.step(applied, output.state, jnp.zeros((1, 20)))
-            return (self.end_substep(drive, output), output), output.overflow
+            drive, changed, ctrl = self.drive.act(drive, fields, output.state, target)
+            output = self.physics.step(fields | changed, output.state, ctrl)
+            return (self.drive.observe(drive, output), output), output.overflow
 
-        start = (drive, self.rest.replace(state=state))
-        (drive, output), overflow = jax.lax.scan(substep, start, length=self.n_substeps)
-        any_overflow = functools.reduce(jnp.bitwise_or, overflow)
-        return drive, output.replace(overflow=any_overflow)
+        begin, rounds = (drive, self.rest.replace(state=state)), self.drive.rounds
+        if rounds == 1:
+            (drive, output), _ = exchange(begin, None)
+        else:
+            (drive, output), bits = jax.lax.scan(exchange, begin, length=rounds)
+            output = output.replace(overflow=functools.reduce(jnp.bitwise_or, bits))
+        return drive, *self.replace_invalid(output)
 
     def replace_invalid(
         self, output: PhysicsOutput
@@ -183,13 +117,17 @@ class Plant:
 
 
 def make_plant(
-    make: Callable[[int], Physics], hand: HandFile, stance: Stance, n_substeps: int
+    make: Callable[[int], Physics],
+    model: mujoco.MjModel,
+    hand: HandFile,
+    stance: Stance,
+    n_substeps: int,
 ) -> Plant:
     """Makes the plant of a scene.
 
     Args:
-        make: makes a backend that does so many physics steps in a call, with the scene,
-            whose hand is built from this file and stance.
+        make: makes a backend of this model that does so many physics steps in a call.
+        model: the scene, whose hand is built from this file and stance.
         hand: the hand file.
         stance: settled stance of that hand.
         n_substeps: physics steps of a control step.
@@ -197,22 +135,17 @@ def make_plant(
     Raises:
         InputError: the hand has an effect that it cannot have here.
     """
-    chain = make_chain(hand, PHYSICS_DT_S)
-    physics = make(n_substeps if chain is None else 1)
-    kp, kv, limit = (hand.nominal.per_joint(k) for k in ("kp", "kv", "force_limit"))
-    drive = drive_params(hand, kp, kv, limit)
-    spec = hand_spec(physics.mj_model)
+    drive, spec = make_drive(hand, model, n_substeps), hand_spec(model)
     return Plant(
-        mj_model=physics.mj_model,
+        mj_model=model,
         spec=spec,
         joint_range=jnp.asarray(spec.joint_range_rad, jnp.float32),
-        physics=physics,
-        drive=jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), drive),
+        physics=make(n_substeps // drive.rounds),
+        drive=drive,
         stance=stance,
-        rest=_output_at_rest(physics.mj_model, stance),
+        rest=_output_at_rest(model, stance),
         n_substeps=n_substeps,
-        chain=chain,
-        effects=make_scene_effects(hand, physics.mj_model, spec),
+        effects=make_scene_effects(hand, model, spec),
     )
 
 

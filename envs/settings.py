@@ -19,7 +19,7 @@ class HandSettings:
         weights: reward weights that replace the start value of the table's.
         randomize: domain randomization.
         contacts_per_world, constraints_per_world: room for contacts and constraint
-            rows on the warp backend, see `envs.physics.make_physics`; what does not fit
+            rows on the warp backend, see `make_physics`; what does not fit
             is dropped, and told (`envs.physics.room`).
     """
 

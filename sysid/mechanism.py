@@ -16,7 +16,7 @@ from envs.errors import InputError, one_of
 from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import build_spec
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 SCHEMA = 1
 Effort = Literal["tau", "cur", "duty", "none"]

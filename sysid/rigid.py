@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from envs.actuator.surroundings import Gravity
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.mechanism import Mechanism
 
 PAYLOAD = "payload"

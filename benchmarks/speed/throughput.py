@@ -30,7 +30,7 @@ import mujoco
 from bare import Layer
 from layers import LAYERS
 
-from envs.physics import BACKENDS, default_backend
+from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 
 ROUNDS = 5

@@ -13,7 +13,7 @@ import numpy as np
 from envs.hand.effect_parts import add_effect_parts
 from envs.hand.figures import FINGERS, Link
 from envs.hand.hand_file import HandFile
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 PHYSICS_DT_S = 0.005
 FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"

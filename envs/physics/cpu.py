@@ -21,7 +21,7 @@ from envs.physics.base import (
     nan_if_diverged,
     nominal_field,
 )
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 # C MuJoCo skips a frame that coincides with its body's, and MJX does not. So the
 # compiler's note that it coincides must go when the frame is given per world.

@@ -165,7 +165,7 @@ def backend_of(args: argparse.Namespace) -> str:
     Raises:
         InputError: there is no such backend, or it is not installed.
     """
-    from envs.physics import BACKENDS, default_backend
+    from envs.physics.backends import BACKENDS, default_backend
     from envs.physics.quiet_mjx import WARP_INSTALLED
 
     name = args.backend or default_backend()

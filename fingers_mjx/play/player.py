@@ -20,8 +20,7 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.batch import BatchEnv
-from envs.hand.drive.chain import ChainState
-from envs.hand.drive.servo import DriveState
+from envs.hand.drive.drive import DriveState
 from envs.hand.figures import figures
 from envs.memory import Memory, PerWorldState
 from envs.observations import Sample
@@ -69,8 +68,7 @@ class Player:
         self._inputs = PlayInputs(env)
         self._reset = jax.jit(env.env.reset)
         self._read: Callable[..., Sample] = jax.jit(self._reading)
-        self._drive: Callable[..., Any] = jax.jit(env.plant.commands)
-        self._begin: Callable[..., Any] = jax.jit(env.plant.begin_substep)
+        self._act: Callable[..., Any] = jax.jit(env.plant.drive.act)
         self._fields: Callable[..., Any] = jax.jit(env.fields)
         self._judge: Callable[..., Any] = jax.jit(self._judged)
 
@@ -129,22 +127,18 @@ class Player:
         data: mujoco.MjData,
         memory: Memory,
         target: Float[np.ndarray, "20"],
-    ) -> DriveState | ChainState:
+    ) -> DriveState:
         """Advances C MuJoCo by a control step; returns the drive's new state."""
-        plant, drive = self.env.plant, memory.drive
-        if not isinstance(drive, ChainState):
-            drive, commands = self._drive(drive, target)
+        drive, state = self.env.plant.drive, memory.drive
+        fields = self._fields(memory.world)
+        for _ in range(drive.rounds):
+            state, changed, commands = self._act(state, fields, _state(data), target)
+            _write(model, changed)
             for command in np.asarray(commands, float):
                 data.ctrl[:] = command
                 mujoco.mj_step(model, data)
-            return drive
-        fields = self._fields(memory.world)
-        for _ in range(plant.n_substeps):
-            drive, applied = self._begin(fields, _state(data), drive, target)
-            _write(model, applied)
-            mujoco.mj_step(model, data)
-            drive = plant.end_substep(drive, _output(data))
-        return drive
+            state = drive.observe(state, _output(data))
+        return state
 
     def _judged(
         self,

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from envs.actuator.catalogue import effect_kind
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.errors import InputError
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.plan import Limits, Plan, joint_address, joint_range, make_plan
 from sysid.mechanism import Mechanism
 

@@ -13,7 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError, one_of
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.waves import WAVES
 from sysid.mechanism import Mechanism
 

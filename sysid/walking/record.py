@@ -14,7 +14,9 @@ from scipy.signal import savgol_filter
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
+from envs.hand.drive.servo import servo_drive
 from envs.hand.figures import figures
+from envs.hand.model import PHYSICS_DT_S
 from sysid.logs.log import MeasuredLog
 
 _AXES = ("x", "y", "z")
@@ -129,10 +131,7 @@ def _turned_back(q: np.ndarray, rate: np.ndarray) -> np.ndarray:
 
 def _commands(env: BatchEnv, targets: np.ndarray) -> Float[np.ndarray, "n s 20"]:
     """What the command path makes of the targets; before the log it had rested."""
-    drive = env.plant.begin_drive(jnp.asarray(targets[0], jnp.float32), None)
-
-    def step(state, target):
-        return env.plant.commands(state, target)
-
-    found = jax.lax.scan(step, drive, jnp.asarray(targets, jnp.float32))[1]
+    drive = servo_drive(env.hand, env.plant.n_substeps, PHYSICS_DT_S)
+    begin = drive.begin(jnp.asarray(targets[0], jnp.float32))
+    found = jax.lax.scan(drive.commands, begin, jnp.asarray(targets, jnp.float32))[1]
     return np.asarray(found, float)

@@ -17,7 +17,7 @@ from mujoco import rollout
 
 from envs.batch import BatchEnv
 from envs.physics.base import nominal_field
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.walking.record import WalkRecord
 
 PIECE_STEPS, LOOKS = 10, (5, 10)

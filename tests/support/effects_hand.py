@@ -66,7 +66,7 @@ def candidates(env, shown):
     plant = env.plant
     base = ("transport_delay", "lowpass_cutoff", "slew_limit", "torque_limit")
     seen, chain = set(), []
-    for kind, like in zip(plant.chain.kinds, plant.chain.params, strict=True):
+    for kind, like in zip(plant.drive.kinds, plant.drive.params, strict=True):
         first = kind.name in base and kind.name not in seen
         seen.add(kind.name)
         same = {k: jnp.stack([v] * len(shown)) for k, v in like.items()}
@@ -95,7 +95,7 @@ def run(env, params, targets):
         chain, scene = params
         plant = dataclasses.replace(
             env.plant,
-            chain=dataclasses.replace(env.plant.chain, params=chain),
+            drive=dataclasses.replace(env.plant.drive, params=chain),
             effects=dataclasses.replace(env.plant.effects, params=scene),
         )
         fields = model_fields(plant.mj_model, plant.spec, world.variation)
@@ -106,10 +106,10 @@ def run(env, params, targets):
             drive, data = carry
             drive, output, invalid = plant.step(fields, data, drive, target)
             imu = plant.effects.sense(imu_of(output.state, plant.effects.down_w))
-            told = plant.joint_reading(drive, output.state)
-            return (drive, output.state), (output, told, imu, drive.effort, invalid)
+            read = plant.drive.reading(drive, output.state.qpos[7:])
+            return (drive, output.state), (output, read, imu, drive.effort, invalid)
 
-        first = (plant.begin_drive(targets[0], start), start)
+        first = (plant.drive.begin(targets[0], start.qpos[7:]), start)
         return jax.lax.scan(step, first, targets)[1]
 
     return jax.tree.map(np.asarray, jax.jit(jax.vmap(one))(params))

@@ -9,6 +9,7 @@ from typing import Any
 
 import flax.struct
 import jax.numpy as jnp
+import mujoco
 import numpy as np
 from jaxtyping import Array, Float
 
@@ -20,32 +21,11 @@ from envs.hand.effect_parts import load_sensor
 from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
 from envs.hand.places import joints_at
-from envs.hand.spec import JOINT_QPOS, JOINT_QVEL, HandSpec
-from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+from envs.hand.spec import JOINT_QPOS, JOINT_QVEL, hand_spec
+from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
 
 LIMIT = "torque_limit"
 _UNLIMITED_NM = 1e6
-
-
-@dataclass(frozen=True)
-class Chain:
-    """The drive of one hand as a tuple of effects.
-
-    Attributes:
-        kinds: the command path and the limit of every hand, and its own effects, in the
-            order of the catalogue.
-        params: their parameters per joint (20); where a hand does not have an effect,
-            those at which it vanishes. The limit takes its own from the model.
-        other: index of the joint that each joint is coupled to.
-        uses_load: whether the physics must tell the load on the joints.
-        dt: substep [s].
-    """
-
-    kinds: tuple[EffectKind, ...]
-    params: tuple[Params, ...]
-    other: tuple[int, ...]
-    uses_load: bool
-    dt: float
 
 
 @flax.struct.dataclass
@@ -65,11 +45,131 @@ class ChainState:
     load: Float[Array, "*b 20"]
 
 
-def make_chain(hand: HandFile, dt: float) -> Chain | None:
+@dataclass(frozen=True)
+class ChainDrive:
+    """`envs.hand.drive.drive.Drive` as a tuple of effects.
+
+    Attributes:
+        kinds: the command path and the limit of every hand, and its own effects, in the
+            order of the catalogue.
+        params: their parameters per joint (20); where a hand does not have an effect,
+            those at which it vanishes. The limit takes its own from the model.
+        other: index of the joint that each joint is coupled to.
+        load_sensors: where the sensors report the torques of the links on the joints;
+            none if no effect depends on them.
+        nominal: the model, for fields that are not given.
+        n_substeps: physics steps of a control step.
+        dt: substep [s].
+    """
+
+    kinds: tuple[EffectKind, ...]
+    params: tuple[Params, ...]
+    other: tuple[int, ...]
+    load_sensors: tuple[slice, ...]
+    nominal: mujoco.MjModel
+    n_substeps: int
+    dt: float
+
+    @property
+    def rounds(self) -> int:
+        """One in each substep: torques depend on angle and speed."""
+        return self.n_substeps
+
+    def begin(self, target: Float[Array, "20"], q: Float[Array, "20"]) -> ChainState:
+        """The chain at rest, in which no signal changes: ẋ = 0.
+
+        Args:
+            target: joint targets that have been sent since t = −∞ [rad].
+            q: joint angles [rad].
+
+        Source:
+            Ours: an episode starts without a transient of filters.
+        """
+        none = jnp.zeros(20)
+        model = self._model(jnp.inf * jnp.ones(20))
+        states = init_states(model, target, q, self.dt)
+        rest = ChainState(effects=states, reading=q, effort=none, load=none)
+        joint = JointInput(target, q, none, around=self._around(rest, q))
+        x = chain_step(model, states, joint, self.dt)[1]
+        return rest.replace(reading=x.reading)
+
+    def act(
+        self,
+        drive: ChainState,
+        fields: ModelFields,
+        state: PhysicsState,
+        target: Float[Array, "20"],
+    ) -> tuple[ChainState, ModelFields, Float[Array, "1 20"]]:
+        """Runs `chain_step` for one substep: (x, target, q, q̇) ↦ (x', τ, F, b, d, I).
+
+        Args:
+            drive: state of the chain, x.
+            fields: model fields of this world; kp [N·m/rad], kd [N·m·s/rad] and limits
+                [N·m] of its drives among them.
+            state: state of the physics before the substep.
+            target: joint targets [rad].
+
+        Returns:
+            The new state, the fields under which the physics applies drive torque τ,
+            friction F, viscosity b, damping d and inertia I, and controls that have no
+            effect.
+
+        Source:
+            Ours: the chain of identification and the one of training are the same code.
+        """
+        q, qd = state.qpos[JOINT_QPOS], state.qvel[JOINT_QVEL]
+        gain, bias = (fields[f"actuator_{name}prm"] for name in ("gain", "bias"))
+        model = self._model(fields["actuator_forcerange"][:, 1])
+        rotor = jnp.asarray(self.nominal.dof_armature[JOINT_QVEL], jnp.float32)
+        around = self._around(drive, q).replace(inertia=rotor)
+        joint = JointInput(target, q, qd, drive.load, gain[:, 0], -bias[:, 2], around)
+        states, x = chain_step(model, drive.effects, joint, self.dt)
+        drive = drive.replace(effects=states, reading=x.reading, effort=x.effort)
+        return drive, _applied(fields, self.nominal, x), jnp.zeros((1, 20))
+
+    def observe(self, drive: ChainState, output: PhysicsOutput) -> ChainState:
+        """Takes the load on the joints from the sensors of the last substep."""
+        if not self.load_sensors:
+            return drive
+        held = [output.sensordata[at][1] for at in self.load_sensors]
+        return drive.replace(load=-jnp.stack(held))
+
+    def reading(self, drive: ChainState, q: Float[Array, "20"]) -> Float[Array, "20"]:
+        """What the chain computed in its last substep, old and with encoder errors.
+
+        y = x.reading of `chain_step` [rad].
+
+        Source:
+            Ours: see `Stage.READING` of the actuator chain.
+        """
+        return drive.reading
+
+    def _model(self, limit_nm: Array) -> tuple[tuple[EffectKind, Params], ...]:
+        """The effects with parameters; the first torque limit is that of the model."""
+        first = next(i for i, kind in enumerate(self.kinds) if kind.name == LIMIT)
+        params = list(self.params)
+        params[first] = {"limit_nm": limit_nm}
+        return tuple(zip(self.kinds, params, strict=True))
+
+    def _around(self, drive: ChainState, q: Float[Array, "20"]) -> Surroundings:
+        """What the other joints did in the last substep."""
+        size, other = jnp.abs(drive.effort), jnp.array(self.other)
+        return Surroundings(
+            others_nm=jnp.sum(size) - size,
+            other_q=q[other],
+            other_nm=drive.effort[other],
+        )
+
+
+def chain_drive(
+    hand: HandFile, model: mujoco.MjModel, n_substeps: int, dt: float
+) -> ChainDrive | None:
     """Makes the chain of a hand; none if MuJoCo's position servo is all of its drive.
 
     Args:
         hand: the hand file.
+        model: the scene with this hand.
+        n_substeps: physics steps of a control step.
         dt: substep of the physics [s].
     """
     own = {e.name for e in hand.effects if in_chain(CATALOGUE[e.name])}
@@ -85,11 +185,15 @@ def make_chain(hand: HandFile, dt: float) -> Chain | None:
     for name, kind in CATALOGUE.items():
         links += [(kind, base[name])] if name in base else []
         links += [(kind, joint_params(hand, name))] if name in own else []
-    return Chain(
+    sensors, names = hand_spec(model).sensors, figures().joint_names
+    uses_load = any(kind.uses_load for kind, _ in links)
+    return ChainDrive(
         kinds=tuple(kind for kind, _ in links),
-        params=tuple(_float32(params) for _, params in links),
+        params=tuple(float32(params) for _, params in links),
         other=_others(hand),
-        uses_load=any(kind.uses_load for kind, _ in links),
+        load_sensors=tuple(sensors[load_sensor(n)] for n in names if uses_load),
+        nominal=model,
+        n_substeps=n_substeps,
         dt=dt,
     )
 
@@ -110,73 +214,7 @@ def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, "20"]
     return found
 
 
-def begin_chain(
-    chain: Chain, target: Float[Array, "20"], q: Float[Array, "20"]
-) -> ChainState:
-    """Returns the chain at rest.
-
-    Args:
-        chain: the drive.
-        target: joint targets that have been sent for long [rad].
-        q: joint angles [rad].
-    """
-    none = jnp.zeros(20)
-    links = _links(chain, jnp.inf * jnp.ones(20))
-    states = init_states(links, target, q, chain.dt)
-    rest = ChainState(effects=states, reading=q, effort=none, load=none)
-    around = _around(chain, rest, q)
-    joint = JointInput(target, q, none, around=around)
-    x = chain_step(links, states, joint, chain.dt)[1]
-    return rest.replace(reading=x.reading)
-
-
-def chain_substep(
-    chain: Chain,
-    fields: ModelFields,
-    nominal: Any,
-    drive: ChainState,
-    state: PhysicsState,
-    target: Float[Array, "20"],
-) -> tuple[ChainState, ModelFields]:
-    """Runs the chain for one substep of the physics.
-
-    Args:
-        chain: the drive.
-        fields: model fields of this world; gains and limits of its drives among them.
-        nominal: `mujoco.MjModel` of the fields that are not given.
-        drive: state of the chain.
-        state: state of the physics before the substep.
-        target: joint targets [rad].
-
-    Returns:
-        The new state, and the fields under which the physics makes this substep.
-    """
-    q, qd = state.qpos[JOINT_QPOS], state.qvel[JOINT_QVEL]
-    gain, bias = (fields[f"actuator_{name}prm"] for name in ("gain", "bias"))
-    links = _links(chain, fields["actuator_forcerange"][:, 1])
-    rotor = jnp.asarray(nominal.dof_armature[JOINT_QVEL], jnp.float32)
-    around = _around(chain, drive, q).replace(inertia=rotor)
-    kp, kd = gain[:, 0], -bias[:, 2]
-    joint = JointInput(target, q, qd, drive.load, kp, kd, around)
-    states, x = chain_step(links, drive.effects, joint, chain.dt)
-    drive = drive.replace(effects=states, reading=x.reading, effort=x.effort)
-    return drive, fields | _applied(fields, nominal, x)
-
-
-def read_load(
-    chain: Chain, spec: HandSpec, drive: ChainState, output: PhysicsOutput
-) -> ChainState:
-    """Takes the load on the joints from the sensors of the last substep, if needed."""
-    if not chain.uses_load:
-        return drive
-    held = [
-        spec.read(output.sensordata, load_sensor(name))[1]
-        for name in figures().joint_names
-    ]
-    return drive.replace(load=-jnp.stack(held))
-
-
-def _applied(fields: ModelFields, nominal: Any, x: Substep) -> ModelFields:
+def _applied(fields: ModelFields, nominal: mujoco.MjModel, x: Substep) -> ModelFields:
     """Model fields that make the physics apply the signals of a substep.
 
     The actuator's force is τ − d (q̇' − q̇), with the damping d taken implicitly.
@@ -203,23 +241,6 @@ def _applied(fields: ModelFields, nominal: Any, x: Substep) -> ModelFields:
     return changed
 
 
-def _links(chain: Chain, limit_nm: Array) -> tuple[tuple[EffectKind, Params], ...]:
-    """The effects with parameters; the first torque limit is that of the model."""
-    first = next(i for i, kind in enumerate(chain.kinds) if kind.name == LIMIT)
-    params = list(chain.params)
-    params[first] = {"limit_nm": limit_nm}
-    return tuple(zip(chain.kinds, params, strict=True))
-
-
-def _around(chain: Chain, drive: ChainState, q: Float[Array, "20"]) -> Surroundings:
-    """What the other joints did in the last substep."""
-    size = jnp.abs(drive.effort)
-    other = jnp.array(chain.other)
-    return Surroundings(
-        others_nm=jnp.sum(size) - size, other_q=q[other], other_nm=drive.effort[other]
-    )
-
-
 def _others(hand: HandFile) -> tuple[int, ...]:
     """Partner of each joint; its own index where there is none."""
     other = list(range(20))
@@ -230,5 +251,6 @@ def _others(hand: HandFile) -> tuple[int, ...]:
     return tuple(other)
 
 
-def _float32(params: dict[str, np.ndarray]) -> Params:
+def float32(params: dict[str, Float[np.ndarray, "..."]]) -> Params:
+    """Parameters as JAX computes with them."""
     return {key: jnp.asarray(value, jnp.float32) for key, value in params.items()}

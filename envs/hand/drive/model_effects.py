@@ -12,15 +12,14 @@ from envs.actuator.effect import EffectKind, Params
 from envs.actuator.effects.floor_tilt import GRAVITY
 from envs.actuator.surroundings import Imu, Scene
 from envs.errors import InputError
-from envs.hand.drive.chain import joint_params
+from envs.hand.drive.chain import float32, joint_params
 from envs.hand.effect_parts import kinds_of, pair_name
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.places import fingers_at
 from envs.hand.spec import HandSpec
-from envs.physics import ModelFields
-from envs.physics.base import nominal_field
-from envs.quiet_mujoco import mujoco
+from envs.physics.base import ModelFields, nominal_field
+from envs.physics.quiet_mujoco import mujoco
 
 EffectParams = dict[str, Params]
 """Parameters by effect name."""
@@ -92,7 +91,7 @@ def make_scene_effects(
     params = {}
     for kind in kinds_of(hand):
         if kind.changes_model is not None or kind.senses is not None:
-            params[kind.name] = _float32(_params(hand, kind))
+            params[kind.name] = float32(_params(hand, kind))
         elif kind.name == "mount_tilt":
             valid = "effects of a hand without a mount; a tilted floor is floor_tilt"
             raise InputError("hand file", "effects", kind.name, valid)
@@ -113,10 +112,6 @@ def _params(hand: HandFile, kind: EffectKind) -> dict[str, np.ndarray]:
         for key, quantity in entry.parameters.items():
             found[key][list(fingers_at(entry.where))] = quantity.value
     return found
-
-
-def _float32(params: dict[str, np.ndarray]) -> Params:
-    return {key: jnp.asarray(value, jnp.float32) for key, value in params.items()}
 
 
 def _check_payload(hand: HandFile, params: EffectParams) -> None:

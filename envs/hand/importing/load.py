@@ -21,7 +21,7 @@ import numpy as np
 from envs.errors import InputError, one_of
 from envs.hand.figures import FINGERS, figures
 from envs.hand.importing.files import TIMESTEP_S, check_files
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 _CHILD = Path(__file__).with_name("child.py")
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from envs.hand.importing.inertia import groups
 from envs.hand.importing.load import CustomHand
 from envs.hand.importing.palm import Frame, link_frames, palm_frame
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 
 @dataclass(frozen=True)

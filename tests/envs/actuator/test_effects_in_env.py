@@ -10,10 +10,10 @@ from support import effects_hand as rig
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
-from envs.hand.drive.chain import ChainState, in_chain, make_chain
-from envs.hand.drive.servo import DriveState
+from envs.hand.drive.chain import ChainState, chain_drive, in_chain
+from envs.hand.drive.servo import CommandState, ServoDrive
 from envs.hand.hand_file import load_hand_file
-from envs.hand.model import PHYSICS_DT_S, build_spec
+from envs.hand.model import PHYSICS_DT_S, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
 from envs.randomize import model_fields
 from envs.tasks.recovery.falls import falls_of
@@ -83,7 +83,7 @@ def test_a_hand_whose_effects_vanish_moves_as_one_without(worlds):
         return (drive, output.state), output.state.qpos
 
     target = jnp.asarray(target, jnp.float32)
-    first = (env.plant.begin_drive(target[0], start), start)
+    first = (env.plant.drive.begin(target[0], start.qpos[7:]), start)
     qpos = jax.jit(lambda: jax.lax.scan(step, first, target)[1])()
     # Constraint rows for friction of 1 µN·m are all that is left of the effects.
     assert np.max(np.abs(qpos - worlds[0][0])) < 2e-3
@@ -92,8 +92,8 @@ def test_a_hand_whose_effects_vanish_moves_as_one_without(worlds):
 def test_the_default_hand_keeps_the_servo_of_the_physics():
     env = rig.env_with()
     state = env.reset(jax.random.key(1))
-    assert env.plant.chain is None
-    assert isinstance(state.memory.drive, DriveState)
+    assert isinstance(env.plant.drive, ServoDrive)
+    assert isinstance(state.memory.drive, CommandState)
     assert env.physics.n_substeps == env.plant.n_substeps == 4
     assert not env.mj_model.dof_frictionloss.any() and env.mj_model.npair == 0
     world = state.memory.world
@@ -108,13 +108,14 @@ def test_the_default_hand_keeps_the_servo_of_the_physics():
 def test_effects_of_the_model_alone_keep_it_too():
     names = [n for n in rig.IN_HAND if not in_chain(CATALOGUE[n])]
     assert len(names) == 8
-    assert make_chain(rig.hand_with(*map(rig.entry, names)), PHYSICS_DT_S) is None
+    hand = rig.hand_with(*map(rig.entry, names))
+    assert chain_drive(hand, build_model(hand), 4, PHYSICS_DT_S) is None
 
 
 def test_the_chain_is_that_of_identification():
     """The same kinds in the order of the catalogue, the command path among them."""
     hand = rig.hand_with(rig.entry("backlash", ("index",)), rig.entry("deadband"))
-    chain = make_chain(hand, PHYSICS_DT_S)
+    chain = chain_drive(hand, build_model(hand), 4, PHYSICS_DT_S)
     names = [kind.name for kind in chain.kinds]
     assert names == [
         "transport_delay",

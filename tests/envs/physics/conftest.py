@@ -5,7 +5,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.physics import PhysicsState, make_physics
+from envs.physics import PhysicsState
+from envs.physics.backends import make_physics
 
 XML = """
 <mujoco>

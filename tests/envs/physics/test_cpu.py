@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.physics import CpuPhysics, PhysicsState
+from envs.physics import PhysicsState
+from envs.physics.cpu import CpuPhysics
 
 
 def plain_loop(mj_model, fields, start, controls, world):

@@ -28,7 +28,8 @@ def motion(env):
         drive, output, _ = env.plant.step(fields, data, drive, target)
         return (drive, output.state), (output.state.qpos[7:], drive.load)
 
-    first = (env.plant.begin_drive(jnp.array(env.stance.target_rad), start), start)
+    stand = jnp.array(env.stance.target_rad)
+    first = (env.plant.drive.begin(stand, start.qpos[7:]), start)
     return jax.jit(lambda: jax.lax.scan(step, first, length=STEPS)[1])()
 
 

@@ -4,9 +4,9 @@ import sys
 import mujoco
 import pytest
 
-import envs.physics
 from envs.errors import InputError
-from envs.physics import default_backend, make_physics, quiet_mjx
+from envs.physics import backends, quiet_mjx
+from envs.physics.backends import default_backend, make_physics
 
 
 def test_unknown_backend_is_named_with_the_nearest(mj_model):
@@ -37,7 +37,7 @@ def test_feature_that_mjx_lacks_is_named():
 
 def test_missing_warp_is_told_and_not_the_default(mj_model, monkeypatch):
     monkeypatch.setattr(quiet_mjx, "WARP_INSTALLED", False)
-    monkeypatch.setattr(envs.physics, "WARP_INSTALLED", False)
+    monkeypatch.setattr(backends, "WARP_INSTALLED", False)
     with pytest.raises(InputError, match=r"fingers-mjx\[warp\]"):
         make_physics("warp", mj_model, 4, 1)
     assert default_backend() == "cpu"
@@ -45,6 +45,8 @@ def test_missing_warp_is_told_and_not_the_default(mj_model, monkeypatch):
 
 def test_import_prints_nothing():
     run = subprocess.run(
-        [sys.executable, "-c", "import envs.physics"], capture_output=True, check=True
+        [sys.executable, "-c", "import envs.physics.backends"],
+        capture_output=True,
+        check=True,
     )
     assert run.stdout == b""

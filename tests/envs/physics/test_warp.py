@@ -3,7 +3,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.physics import make_physics
+from envs.physics.backends import make_physics
 
 pytestmark = pytest.mark.gpu
 

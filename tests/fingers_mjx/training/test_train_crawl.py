@@ -12,7 +12,7 @@ from support.train_setup import assert_same_end, leaves
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
-from envs.physics import default_backend
+from envs.physics.backends import default_backend
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.runs.setup import identity, make_env, new_setup
 from fingers_mjx.training.train import train

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
 from sysid.logs.log import make_log

@@ -11,7 +11,7 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import draw_case
 from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.measured.resampling import held_targets, shares, smoothed
 from sysid.diagnosis.measured.segments import grid_step_s, pieces_of

@@ -13,7 +13,7 @@ import pytest
 from benchmarks.diagnosis.public_logs.emps import load_emps
 from benchmarks.diagnosis.public_logs.sts3215 import RAD_PER_COUNT, load_sts3215
 from benchmarks.diagnosis.public_logs.xl330 import load_xl330
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import examine
 from sysid.mechanism import Figure, JointDrive, model_mechanism
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose
 from sysid.logs.log import make_log
 from sysid.mechanism import Figure, JointDrive, model_mechanism

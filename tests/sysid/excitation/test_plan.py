@@ -4,7 +4,7 @@ import pytest
 from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.stands import make_stand
 from envs.errors import InputError
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.check import fitting_plan, rehearse
 from sysid.excitation.files import separation_lines, write_plan
 from sysid.excitation.plan import Limits, joint_groups, make_plan, rest_posture

@@ -9,7 +9,7 @@ from support import effects_rig as rig
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import lognormal, normal
-from envs.hand.drive.servo import MAX_DELAY_S, DriveParams, drive_step, init_drive_state
+from envs.hand.drive.servo import CommandPath, ServoDrive, command_step
 
 INF = np.inf
 RAMP = np.linspace(0.0, 0.5, 200)
@@ -265,15 +265,8 @@ def test_backlash_passes_no_torque_inside_the_gap():
     assert np.all(np.abs(motor) <= 0.01 + 1e-6)
 
 
-def drive(**changes):
-    base = {"delay_s": 0.0, "lowpass_hz": INF, "speed_limit": INF, "torque_limit": INF}
-    gains = {"kp": 3.0, "kd": 0.1}
-    values = {k: jnp.asarray(v) for k, v in {**base, **gains, **changes}.items()}
-    return DriveParams(**values, max_delay_s=MAX_DELAY_S)
-
-
-def both_chains(effects, params, dt=0.005):
-    """Torques of chain and drive for the same targets, angles and speeds."""
+def both_chains(effects, path, limit, dt=0.005):
+    """Torques of chain and servo drive for the same targets, angles and speeds."""
     print("seed 3")
     rng = np.random.default_rng(3)
     inputs = jnp.asarray(rng.uniform(-1.0, 1.0, (200, 3, 20)), jnp.float32)
@@ -285,16 +278,17 @@ def both_chains(effects, params, dt=0.005):
         target, q, qd = row
         joint = JointInput(target, q, qd, 0.0, 2.0, 0.2)
         ours, x = chain_step(model, ours, joint, dt)
-        theirs, _, torque = drive_step(params, theirs, target, q, qd, dt)
+        theirs, command = command_step(path, theirs, target, dt)
+        torque = jnp.clip(3.0 * (command - q) - 0.1 * qd, -limit, limit)
         return (ours, theirs), (x.torque, torque)
 
-    start = (init_states(model, rest, rest, dt), init_drive_state(rest, params, dt))
+    start = (init_states(model, rest, rest, dt), ServoDrive(path, 1, dt).begin(rest))
     ours, theirs = jax.lax.scan(step, start, inputs)[1]
     return np.max(np.abs(ours - theirs))
 
 
 def test_six_effects_are_the_drive_of_the_hand():
-    params = drive(delay_s=0.02, lowpass_hz=3.0, speed_limit=2.5, torque_limit=0.6)
+    path = CommandPath(*(jnp.asarray(x) for x in (0.02, 3.0, 2.5)))
     effects = {
         "transport_delay": {"delay_s": 0.02},
         "lowpass_cutoff": {"cutoff_hz": 3.0},
@@ -303,9 +297,9 @@ def test_six_effects_are_the_drive_of_the_hand():
         "damping": {"scale": 0.5},
         "torque_limit": {"limit_nm": 0.6},
     }
-    assert both_chains(effects, params) < 1e-5
+    assert both_chains(effects, path, 0.6) < 1e-5
     other = {**effects, "transport_delay": {"delay_s": 0.021}}
-    assert both_chains(other, params) > 1e-3
+    assert both_chains(other, path, 0.6) > 1e-3
 
 
 def test_priors_have_their_quantiles():

@@ -1,3 +1,4 @@
+import dataclasses
 from functools import partial
 
 import jax
@@ -6,41 +7,34 @@ import mujoco
 import numpy as np
 import pytest
 
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.chain import JointInput, chain_step
 from envs.errors import InputError
-from envs.hand.drive.servo import (
-    DriveParams,
-    command_sequence,
-    command_step,
-    drive_params,
-    drive_step,
-    init_drive_state,
-    servo_torque,
-)
+from envs.hand.drive.servo import CommandPath, ServoDrive, command_step, servo_drive
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
+from envs.hand.model import build_model
 
 DT = 0.005
 SEED = 20260103
 JOINTS = 20
-sequence = jax.jit(command_sequence, static_argnames=("dt", "n_substeps"))
 
 
-def make(delay_s=0.0, lowpass_hz=np.inf, speed_limit=np.inf, **changes) -> DriveParams:
-    """A drive in which every stage is at its identity unless given."""
-    values = {
-        "delay_s": jnp.asarray(delay_s),
-        "lowpass_hz": jnp.asarray(lowpass_hz),
-        "speed_limit": jnp.full(JOINTS, speed_limit),
-        "kp": jnp.ones(JOINTS),
-        "kd": jnp.zeros(JOINTS),
-        "torque_limit": jnp.full(JOINTS, jnp.inf),
-    }
-    return DriveParams(**(values | changes))
+def sequence(n_substeps):
+    """Commands of one control step of the default hand, and its drive."""
+    drive = servo_drive(load_hand_file(), n_substeps, DT)
+    return drive, jax.jit(drive.commands)
 
 
-def respond(params: DriveParams, targets: np.ndarray, dt: float = DT) -> np.ndarray:
+def make(delay_s=0.0, lowpass_hz=np.inf, speed_limit=np.inf) -> CommandPath:
+    """A command path in which every stage is at its identity unless given."""
+    limits = jnp.full(JOINTS, speed_limit)
+    return CommandPath(jnp.asarray(delay_s), jnp.asarray(lowpass_hz), limits)
+
+
+def respond(params: CommandPath, targets: np.ndarray, dt: float = DT) -> np.ndarray:
     """Commands for a sequence of scalar targets, sent to all joints from rest at 0."""
-    state = init_drive_state(jnp.zeros(JOINTS), params, dt)
+    state = ServoDrive(params, 1, dt).begin(jnp.zeros(JOINTS))
     sent = jnp.asarray(targets)[:, None] * jnp.ones(JOINTS)
     return np.asarray(_scan(params, state, sent, dt))
 
@@ -108,17 +102,16 @@ def test_fractional_delay_interpolates_and_is_exact_on_ramps(delay_s):
 
 
 def test_neighbouring_delay_would_not_pass():
-    """Negative control: a millisecond is told apart."""
+    """Negative control: a millisecond is distinguished."""
     time_s = DT * np.arange(60)
     commands = respond(make(delay_s=0.018), time_s)[:, 0]
     assert np.min(np.abs(commands[9:] - (time_s[9:] - 0.019))) > 5e-4
 
 
 def test_one_control_step_delay_is_four_substeps():
-    params = drive_params(load_hand_file(), *_nominal())
-    state = init_drive_state(jnp.zeros(JOINTS), params, DT)
-    state, first = sequence(params, state, jnp.ones(JOINTS), DT, 4)
-    _, second = sequence(params, state, jnp.ones(JOINTS), DT, 4)
+    drive, commands = sequence(4)
+    state, first = commands(drive.begin(jnp.zeros(JOINTS)), jnp.ones(JOINTS))
+    _, second = commands(state, jnp.ones(JOINTS))
     np.testing.assert_allclose(first, 0.0, atol=1e-6)
     assert np.all(np.asarray(second[0]) > 0.01)
 
@@ -149,39 +142,35 @@ def test_identity_values_pass_the_target_through():
 
 
 def test_a_drive_at_rest_stays_at_rest():
-    params = drive_params(load_hand_file(), *_nominal())
+    drive, sent = sequence(50)
     rest = jnp.asarray(np.random.default_rng(SEED).uniform(-1, 1, JOINTS), jnp.float32)
-    state = init_drive_state(rest, params, DT)
-    later, commands = sequence(params, state, rest, DT, 50)
+    state = drive.begin(rest)
+    later, commands = sent(state, rest)
     np.testing.assert_array_equal(commands, jnp.broadcast_to(rest, (50, JOINTS)))
     for left, was in zip(*map(jax.tree.leaves, (later, state)), strict=True):
         np.testing.assert_array_equal(left, was)
 
 
 def test_reset_leaves_nothing_behind():
-    params = drive_params(load_hand_file(), *_nominal())
+    drive, sent = sequence(20)
     start, far = jnp.zeros(JOINTS), jnp.full(JOINTS, 2.0)
-    fresh = init_drive_state(start, params, DT)
-    used, _ = sequence(params, fresh, far, DT, 20)
-    again = init_drive_state(start, params, DT)
-    _, expected = sequence(params, fresh, start, DT, 20)
-    _, commands = sequence(params, again, start, DT, 20)
+    fresh = drive.begin(start)
+    used, _ = sent(fresh, far)
+    _, expected = sent(fresh, start)
+    _, commands = sent(drive.begin(start), start)
     np.testing.assert_array_equal(commands, expected)
-    _, leaked = sequence(params, used, start, DT, 20)
+    _, leaked = sent(used, start)
     assert np.max(np.abs(np.asarray(leaked - expected))) > 0.01
 
 
 def test_sequence_is_the_repeated_step():
-    params = drive_params(load_hand_file(), *_nominal())
-    state = init_drive_state(jnp.zeros(JOINTS), params, DT)
-    target, q, qd = jnp.full(JOINTS, 0.4), jnp.full(JOINTS, 0.1), jnp.full(JOINTS, -0.2)
-    end, commands = sequence(params, state, target, DT, 7)
-    step = jax.jit(drive_step, static_argnames="dt")
+    drive, sent = sequence(7)
+    state, target = drive.begin(jnp.zeros(JOINTS)), jnp.full(JOINTS, 0.4)
+    end, commands = sent(state, target)
+    step = jax.jit(command_step, static_argnames="dt")
     for k in range(7):
-        state, command, torque = step(params, state, target, q, qd, DT)
+        state, command = step(drive.path, state, target, dt=DT)
         np.testing.assert_allclose(command, commands[k], atol=1e-7)
-        expected = servo_torque(params, command, q, qd)
-        np.testing.assert_allclose(torque, expected, atol=1e-6)
     for one, other in zip(*map(jax.tree.leaves, (state, end)), strict=True):
         np.testing.assert_allclose(one, other, atol=1e-7)
 
@@ -193,22 +182,35 @@ def _nominal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_parameters_are_the_nominal_ones_times_the_scales():
     kp, kv, force = _nominal()
-    params = drive_params(load_hand_file(), kp, kv, force)
-    np.testing.assert_allclose(params.kp, 18.7 * kp, rtol=1e-6)
-    np.testing.assert_allclose(params.kd, np.sqrt(18.7) * kv, rtol=1e-6)
-    np.testing.assert_allclose(params.torque_limit, force, rtol=1e-6)
-    assert float(params.delay_s) == pytest.approx(0.02)
+    hand = load_hand_file()
+    gains = _gains(build_model(hand))
+    np.testing.assert_allclose(gains[0], 18.7 * kp, rtol=1e-6)
+    np.testing.assert_allclose(gains[1], np.sqrt(18.7) * kv, rtol=1e-6)
+    np.testing.assert_allclose(gains[2], force, rtol=1e-6)
+    assert float(servo_drive(hand, 4, DT).path.delay_s) == pytest.approx(0.02)
+    slow = dataclasses.replace(hand.delay_s, value=0.05)
     with pytest.raises(InputError, match="delay_s"):
-        drive_params(load_hand_file(), kp, kv, force, max_delay_s=0.01)
+        servo_drive(dataclasses.replace(hand, delay_s=slow), 4, DT)
 
 
-def _mujoco_servo(params: DriveParams) -> mujoco.MjModel:
+def _gains(model: mujoco.MjModel) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Position gains, velocity gains and torque limits of a model's servos."""
+    limits = model.actuator_forcerange[:, 1]
+    return model.actuator_gainprm[:, 0], -model.actuator_biasprm[:, 2], limits
+
+
+def _servo_torque(kp, kd, limit, command, q, qd):
+    """Torque of the actuator chain with a torque limit as its only effect."""
+    joint = JointInput(command, q, qd, 0.0, jnp.asarray(kp), jnp.asarray(kd))
+    model = ((CATALOGUE["torque_limit"], {"limit_nm": jnp.asarray(limit)}),)
+    return chain_step(model, ((),), joint, DT)[1].torque
+
+
+def _mujoco_servo(gains) -> mujoco.MjModel:
     """Twenty free hinges with the actuators that the documentation names."""
     bodies, actuators = "", ""
     for j in range(JOINTS):
-        kp, kd, limit = (
-            float(x[j]) for x in (params.kp, params.kd, params.torque_limit)
-        )
+        kp, kd, limit = (float(x[j]) for x in gains)
         bodies += (
             f'<body><joint name="j{j}" axis="0 1 0"/>'
             '<geom size="0.01" mass="0.1" contype="0"/></body>'
@@ -227,8 +229,8 @@ def _mujoco_servo(params: DriveParams) -> mujoco.MjModel:
 def test_mujoco_computes_the_same_torque():
     print(f"seed {SEED}")
     rng = np.random.default_rng(SEED)
-    params = drive_params(load_hand_file(), *_nominal())
-    model = _mujoco_servo(params)
+    gains = kp, kd, limit = _gains(build_model(load_hand_file()))
+    model = _mujoco_servo(gains)
     data = mujoco.MjData(model)
     saturated = set()
     for _ in range(20):
@@ -236,11 +238,11 @@ def test_mujoco_computes_the_same_torque():
         data.qvel[:] = rng.uniform(-3, 3, JOINTS)
         mujoco.mj_forward(model, data)
         state = (jnp.asarray(x) for x in (data.ctrl, data.qpos, data.qvel))
-        torque = servo_torque(params, *state)
+        torque = _servo_torque(*gains, *state)
         np.testing.assert_allclose(data.actuator_force, torque, atol=2e-6)
-        saturated |= set((np.abs(torque) >= params.torque_limit).tolist())
+        saturated |= set((np.abs(torque) >= np.float32(limit)).tolist())
     assert saturated == {True, False}
-    other = servo_torque(params.replace(kd=params.kd * 1.01), *_last(data))
+    other = _servo_torque(kp, 1.01 * kd, limit, *_last(data))
     assert np.max(np.abs(data.actuator_force - np.asarray(other))) > 1e-4
 
 
@@ -249,14 +251,15 @@ def _last(data: mujoco.MjData) -> tuple[jax.Array, ...]:
 
 
 def test_jit_and_vmap_over_randomized_drives_equal_the_single_drive():
-    base = drive_params(load_hand_file(), *_nominal())
+    base = servo_drive(load_hand_file(), 12, DT)
     delays = jnp.array([0.0, 0.0123, 0.02, 0.04])
     cutoffs = jnp.array([2.0, 3.0, 4.0, 5.0])
 
     def run(delay_s, lowpass_hz):
-        params = base.replace(delay_s=delay_s, lowpass_hz=lowpass_hz)
-        state = init_drive_state(jnp.zeros(JOINTS), params, DT)
-        return command_sequence(params, state, jnp.full(JOINTS, 0.3), DT, 12)[1]
+        path = base.path.replace(delay_s=delay_s, lowpass_hz=lowpass_hz)
+        drive = dataclasses.replace(base, path=path)
+        state = drive.begin(jnp.zeros(JOINTS))
+        return drive.commands(state, jnp.full(JOINTS, 0.3))[1]
 
     batch = jax.jit(jax.vmap(run))(delays, cutoffs)
     run_one = jax.jit(run)
@@ -268,16 +271,18 @@ def test_jit_and_vmap_over_randomized_drives_equal_the_single_drive():
 
 def _mean_torque(scales: dict[str, jax.Array]) -> jax.Array:
     """Mean torque over a fixed motion of a drive whose parameters are scaled."""
-    base = make(delay_s=0.0123, lowpass_hz=3.0, kd=jnp.full(JOINTS, 0.1))
-    params = base.replace(**{k: getattr(base, k) * v for k, v in scales.items()})
+    path = make(0.0123 * scales["delay_s"], 3.0 * scales["lowpass_hz"])
+    kp, kd = scales["kp"], 0.1 * scales["kd"]
     targets = jnp.asarray(np.random.default_rng(SEED).uniform(-1, 1, (24, JOINTS)))
     q, qd = jnp.linspace(0, 1, JOINTS), jnp.ones(JOINTS)
 
     def step(state, target):
-        state, _, torque = drive_step(params, state, target, q, qd, DT)
-        return state, jnp.mean(torque)
+        state, command = command_step(path, state, target, DT)
+        joint = JointInput(command, q, qd, kp=kp, kd=kd)
+        return state, jnp.mean(chain_step((), (), joint, DT)[1].torque)
 
-    return jnp.mean(jax.lax.scan(step, init_drive_state(q, params, DT), targets)[1])
+    start = ServoDrive(path, 1, DT).begin(q)
+    return jnp.mean(jax.lax.scan(step, start, targets)[1])
 
 
 def test_gradients_are_those_of_finite_differences():

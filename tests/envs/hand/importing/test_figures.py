@@ -267,7 +267,7 @@ def test_the_environment_runs_the_imported_hand(ours):
     hand = with_link(import_hand(ours).hand, 7, kp=0.5, range_rad=(-0.1, 1.2))
     env = CrawlEnv(hand=hand)
     assert env.mj_model.jnt_range[8] == pytest.approx([-0.1, 1.2])
-    assert float(env.plant.drive.kp[7]) == pytest.approx(0.5)
+    assert env.mj_model.actuator_gainprm[7, 0] == pytest.approx(0.5)
 
 
 def test_a_flat_link_keeps_moments_that_a_body_can_have(tmp_path):

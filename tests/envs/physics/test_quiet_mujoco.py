@@ -1,6 +1,6 @@
 import pytest
 
-from envs.quiet_mujoco import mujoco
+from envs.physics.quiet_mujoco import mujoco
 
 XML = (
     "<mujoco><worldbody><body><freejoint/><geom size='1'/></body></worldbody></mujoco>"
