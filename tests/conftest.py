@@ -1,8 +1,12 @@
-"""Watches what the tests make the interpreter do (X1, X3)."""
+"""Runs shape annotations as checks, and watches the interpreter (X1, X3)."""
 
 import sys
 
 import pytest
+from jaxtyping import install_import_hook
+
+# Before any test imports them: every array is checked against its annotation.
+install_import_hook(["rewards", "envs", "sysid"], "support.shapes.check_arrays")
 
 NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
 UNSAFE = ("pickle.find_class", "os.system")

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from envs.actuator.catalogue import CATALOGUE
 from sysid.result import Alternative, Cause, Estimate, Gain
@@ -50,7 +50,7 @@ def verdict_of(
     all_axes: tuple[Axis, ...],
     full: Sequence[Judged],
     plain: Judged,
-    count: Float[np.ndarray, " b"],
+    count: Int[np.ndarray, " b"],
 ) -> dict[str, Any]:
     """Returns the fields of the diagnosis that the fits decide.
 

@@ -1,13 +1,13 @@
 """Commands in whole steps of a register."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 
 def quantized(
-    command: Float[Array, "*j"], step_rad: Float[Array, "*j"]
+    command: Float[Array, "*j"], step_rad: Float[ArrayLike, "*#j"]
 ) -> Float[Array, "*j"]:
     """Rounds to the nearest step; a step of zero leaves the command as it is."""
     safe = jnp.where(step_rad > 0.0, step_rad, 1.0)

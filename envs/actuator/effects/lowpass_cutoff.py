@@ -1,7 +1,7 @@
 """First-order low-pass of the target in the firmware."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
@@ -9,7 +9,7 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 def filtered(
     last: Float[Array, "*j"],
     command: Float[Array, "*j"],
-    cutoff_hz: Float[Array, "*j"],
+    cutoff_hz: Float[ArrayLike, "*#j"],
     dt: float | Float[Array, "*j"],
 ) -> Float[Array, "*j"]:
     """Advances the low-pass, exactly for a command that is held over the substep.

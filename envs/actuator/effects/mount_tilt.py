@@ -7,9 +7,9 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, normal
 
 
 def tilted(
-    gravity: Float[ArrayLike, "*j 3"],
-    roll: Float[ArrayLike, "*j"],
-    pitch: Float[ArrayLike, "*j"],
+    gravity: Float[ArrayLike, "*#j 3"],
+    roll: Float[ArrayLike, "*#j"],
+    pitch: Float[ArrayLike, "*#j"],
 ) -> Float[Array, "*j 3"]:
     """Returns gravity in a frame that is turned by (roll, pitch, 0), as a vector."""
     gravity = jnp.asarray(gravity)

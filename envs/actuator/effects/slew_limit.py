@@ -1,7 +1,7 @@
 """Largest speed of the command."""
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
@@ -9,7 +9,7 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 def limited(
     last: Float[Array, "*j"],
     command: Float[Array, "*j"],
-    speed_rad_s: Float[Array, "*j"],
+    speed_rad_s: Float[ArrayLike, "*#j"],
     dt: float | Float[Array, "*j"],
 ) -> Float[Array, "*j"]:
     """Moves towards the command by at most v_max Δt."""

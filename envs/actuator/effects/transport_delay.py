@@ -3,7 +3,7 @@
 import math
 
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, ArrayLike, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
@@ -17,7 +17,7 @@ def delay_line(rest: Float[Array, "*j"], dt: float) -> Float[Array, " slots *j"]
 
 
 def read_delayed(
-    line: Float[Array, " slots *j"], delay_s: Float[Array, "*j"], dt: float
+    line: Float[Array, " slots *j"], delay_s: Float[ArrayLike, "*#j"], dt: float
 ) -> Float[Array, "*j"]:
     """Reads the line at a fractional age: linear between the two samples around it."""
     age = jnp.clip(delay_s / dt, 0.0, line.shape[0] - 1.0)

@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Num
 
 from envs.tasks.recovery.falls import SIDES
 from envs.tasks.recovery.settle import UPRIGHT_TILT_DEG
@@ -46,7 +46,7 @@ def recovery_measures(
 
 
 def _per_side(
-    found: Mapping[str, Array], side: Float[Array, ""]
+    found: Mapping[str, Array], side: Num[Array, ""]
 ) -> dict[str, Float[Array, ""]]:
     """The same again under the name of the side, NaN for falls on the other."""
     return {

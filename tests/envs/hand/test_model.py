@@ -1,3 +1,4 @@
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
@@ -153,7 +154,7 @@ def test_fingers_can_touch_each_other():
 def test_sensors_are_found_by_name():
     spec = hand_spec(MODEL)
     assert sum(s.stop - s.start for s in spec.sensors.values()) == MODEL.nsensordata
-    vector = np.arange(MODEL.nsensordata)
+    vector = jnp.arange(float(MODEL.nsensordata))
     torque = [spec.read(vector, f"torque_{name}") for name in figures().joint_names]
     assert all(len(x) == 1 for x in torque)
     assert len({int(x[0]) for x in torque}) == 20

@@ -1,6 +1,7 @@
 import copy
 
 import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
@@ -83,7 +84,7 @@ def test_alone_under_vmap_and_nested_is_the_same(mj_model, fields, start, contro
     nested = jax.vmap(jax.vmap(step))(
         *jax.tree.map(lambda x: x[None], (fields, start, controls[0]))
     )
-    alone = step(*jax.tree.map(lambda x: x[1], (fields, start, controls[0])))
+    alone = step(*jax.tree.map(lambda x: jnp.array(x[1]), (fields, start, controls[0])))
     assert same(jax.tree.map(lambda x: x[0], nested), batch)
     assert same(alone, jax.tree.map(lambda x: x[1], batch))
 
@@ -138,4 +139,4 @@ def test_inertia_that_is_a_constant_of_the_compiler_is_refused():
     state = PhysicsState(np.float32(loose.qpos0), np.zeros(6), np.zeros(6))
     mass = {"body_mass": np.float32(2 * loose.body_mass)}
     with pytest.raises(InputError, match=r"body_mass.*loose"):
-        CpuPhysics(loose, 1).step(mass, state, np.zeros((1, 0)))
+        CpuPhysics(loose, 1).step(mass, state, jnp.zeros((1, 0)))

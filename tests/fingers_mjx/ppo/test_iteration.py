@@ -151,7 +151,7 @@ def test_only_the_adapter_imports_brax():
     package = Path(importlib.util.find_spec("fingers_mjx").origin).parent
     imports = re.compile(r"^\s*(from|import) brax", re.MULTILINE)
     texts = {p.name: p.read_text(encoding="utf-8") for p in package.rglob("*.py")}
-    assert [n for n, text in texts.items() if imports.search(text)] == ["ppo_brax.py"]
+    assert [n for n, text in texts.items() if imports.search(text)] == ["brax.py"]
 
 
 @pytest.mark.parametrize("weight", [0.0, 2.0])
