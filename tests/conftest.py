@@ -4,9 +4,11 @@ import sys
 
 import pytest
 from jaxtyping import install_import_hook
+from support import shapes
 
 # Before any test imports them: every array is checked against its annotation.
-install_import_hook(["rewards", "envs", "sysid"], "support.shapes.check_arrays")
+CHECKER = f"{shapes.__name__}.{shapes.check_arrays.__name__}"
+install_import_hook(["rewards", "envs", "sysid"], CHECKER)
 
 NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
 UNSAFE = ("pickle.find_class", "os.system")

@@ -1,7 +1,7 @@
 """A type checker for jaxtyping's import hook that looks at arrays alone.
 
-Tests hand stand-ins to parameters that are no arrays, and pytrees of data classes are
-rebuilt with anything as leaves; shapes and kinds of arrays are what annotations promise.
+Tests pass stand-ins for parameters that are no arrays, and pytrees of data classes are
+rebuilt with anything as leaves: arrays are what annotations promise.
 """
 
 from typing import get_args

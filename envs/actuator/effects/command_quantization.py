@@ -10,6 +10,7 @@ def quantized(
     command: Float[Array, "*j"], step_rad: Float[ArrayLike, "*#j"]
 ) -> Float[Array, "*j"]:
     """Rounds to the nearest step; a step of zero leaves the command as it is."""
+    step_rad = jnp.asarray(step_rad)
     safe = jnp.where(step_rad > 0.0, step_rad, 1.0)
     return jnp.where(step_rad > 0.0, jnp.round(command / safe) * safe, command)
 

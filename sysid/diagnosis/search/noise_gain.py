@@ -27,7 +27,7 @@ def loudness(problem: Problem, theta: Float[np.ndarray, " n"], error: float) -> 
     if not where or theta[where[0]] <= 0.0:
         return 0.0
     slots, track = problem.space.slots, problem.data.track
-    soft, rotor = (float(slots[i].value(theta[i])) for i in where)
+    soft, rotor = (float(slots[i].value(np.array(theta[i]))) for i in where)
     whole = float(np.mean(np.asarray(track.inertia)))
     rotor = min(rotor, MOST_ROTOR * whole)
     heard = (track.noise[1, 0], track.noise[1, 3], EVERY * problem.data.dt)

@@ -80,9 +80,7 @@ class Slot:
     comb: bool = False
     wide: float = 5.0
 
-    def value(
-        self, u: float | Float[np.ndarray, "*c"]
-    ) -> float | Float[np.ndarray, "*c"]:
+    def value(self, u: Float[np.ndarray, "*c"]) -> Float[np.ndarray, "*c"]:
         """Returns the parameter at a coordinate."""
         if self.kind == "linear":
             return self.scale * u
