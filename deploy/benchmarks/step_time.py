@@ -19,7 +19,7 @@ from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_deploy.rotations import conjugate, gravity
-from fingers_robot.reading import Health, ImuReading, Reading
+from fingers_robot.reading import ImuReading, Reading, sound_health
 from fingers_robot.runtime.realtime import resident_mb
 from fingers_robot.safety import (
     Inputs,
@@ -46,7 +46,6 @@ def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
     noise = rng.standard_normal((997, 26))
     quat = conjugate(interface.v_quat_b)
     pose = np.asarray(interface.initial_target_rad, np.float64)
-    nominal = (np.full(20, 40.0), 14.8, np.zeros(20, np.uint32), np.ones(20))
     took, memory, proposal, challenge = np.empty(steps), [], None, 0
     gc.collect()
     gc.freeze()
@@ -60,7 +59,7 @@ def measure(bundle: Bundle, runtime: Runtime, steps: int) -> dict:
         reading = Reading(t, pos, 0.1 * n[:20])
         imu = ImuReading(t, quat, 0.01 * n[20:23])
         on = state.mode in (Mode.ARMING, Mode.ACTIVE)
-        health = Health(t, on, not on, *nominal, pos)
+        health = sound_health(t, on, pos)
         operator = Operator.ARM if k == -WARM_UP + 5 else Operator.NONE
         inputs = Inputs(
             reading, imu, health, proposal, True, operator, True, "", 0, k + WARM_UP

@@ -15,7 +15,7 @@ from fingers_deploy.controller import PolicyController
 from fingers_robot.behaviour.command import FixedCommand
 from fingers_robot.behaviour.exchange import Answer, Query
 from fingers_robot.behaviour.policies import Policies
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading, sound_health
 from fingers_robot.runtime.core import Core
 from fingers_robot.runtime.ticker import Tick
 from fingers_robot.safety import Mode, Operator, make_limits
@@ -101,17 +101,7 @@ class LabDriver:
         self._health_s = -1.0
 
     def _ask(self) -> Health:
-        on = self.hand.enabled
-        return Health(
-            self._clock(),
-            on,
-            not on,
-            np.full(20, 40.0),
-            14.8,
-            np.zeros(20, np.uint32),
-            np.ones(20),
-            self._packet["pos"],
-        )
+        return sound_health(self._clock(), self.hand.enabled, self._packet["pos"])
 
 
 class LabLink:

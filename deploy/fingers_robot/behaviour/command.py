@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array
+
 Ranges = tuple[tuple[float, float], ...]
 
 FRESH_S = 0.25

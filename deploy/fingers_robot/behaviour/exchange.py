@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from fingers_robot.reading import Array
 from fingers_robot.safety.detectors.policy import complement
 from fingers_robot.safety.types import PolicyFault, Proposal
 
-Array = NDArray[np.float64]
 COMMANDS = 9  # most task inputs of any task
 
 

@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Interface
 from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
+from fingers_robot.reading import Array
 from fingers_robot.safety.motion import toward
 
-Array = NDArray[np.float64]
 _MAX_BYTES = 64 * 2**20
 _NO_COMMAND = padded(np.zeros(0, np.float32))
 

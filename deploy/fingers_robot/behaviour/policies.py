@@ -27,9 +27,9 @@ from fingers_robot.behaviour.sources import Sources, SourceSample
 from fingers_robot.behaviour.task_inputs import inputs_of
 from fingers_robot.behaviour.tracker_port import TrackerPort
 from fingers_robot.behaviour.upright import tilt_angle, upright_step
+from fingers_robot.reading import Array
 from fingers_robot.safety.types import PolicyFault
 
-Array = NDArray[np.float64]
 RECOVERY = "recovery"
 SAME_STANCE_RAD = 0.02
 STAND_S = 1.0

@@ -3,12 +3,11 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from fingers_deploy.manifest import Interface
+from fingers_robot.reading import Array
 from fingers_robot.safety.motion import ramp_duration, smooth_ramp
-
-Array = NDArray[np.float64]
 
 SETTLE_S = 1.5
 SPEED_SHARE = 0.8

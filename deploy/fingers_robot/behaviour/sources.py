@@ -21,7 +21,6 @@ from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, Given, reads, resized
 from fingers_robot.behaviour.tracker_port import TrackerPort
 
-Array = NDArray[np.float64]
 _YAW = 2  # entry of the crawl command
 
 

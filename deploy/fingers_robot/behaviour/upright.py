@@ -2,12 +2,8 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fingers_deploy.rotations import gravity, unrotate
-
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array
 
 MAX_TILT_RAD = math.radians(10.0)
 MAX_SPEED_RAD_S = 4.0

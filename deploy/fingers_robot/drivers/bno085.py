@@ -13,9 +13,8 @@ import time
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array
 
 GYROSCOPE, GAME_ROTATION = 0x02, 0x08
 _I2C_SLAVE = 0x0703

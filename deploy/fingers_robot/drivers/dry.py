@@ -2,13 +2,8 @@
 
 import dataclasses
 
-import numpy as np
-from numpy.typing import NDArray
-
 from fingers_robot.drivers.protocol import Driver
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
-
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array, DriverInfo, Health, ImuReading, Reading
 
 
 class DryRun:

@@ -11,13 +11,11 @@ import time
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.rotations import conjugate, multiply, unrotate
-from fingers_robot.reading import ImuReading
+from fingers_robot.reading import Array, ImuReading
 
-Array = NDArray[np.float64]
 _NORM_TOLERANCE = 1e-3
 
 

@@ -2,12 +2,7 @@
 
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
-
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array, DriverInfo, Health, ImuReading, Reading
 
 
 class Imu(Protocol):

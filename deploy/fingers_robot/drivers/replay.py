@@ -8,14 +8,18 @@ import bisect
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import JOINT_COUNT, Interface
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+from fingers_deploy.manifest import Interface
+from fingers_robot.reading import (
+    Array,
+    DriverInfo,
+    Health,
+    ImuReading,
+    Reading,
+    sound_health,
+)
 from fingers_robot.record.log import Log
-
-Array = NDArray[np.float64]
 
 
 class ReplayDriver:
@@ -68,16 +72,9 @@ class ReplayDriver:
     def health(self) -> Health:
         """Temperatures and supply of the newest row; the rest as it should be."""
         row, t_s = self._row()
-        return Health(
-            t_s=t_s,
-            enabled=self._enabled,
-            disabled=not self._enabled,
-            temperature_c=row["temp"].astype(np.float64),
-            bus_v=float(row["supply"]),
-            error_code=np.zeros(JOINT_COUNT, np.uint32),
-            effort_limit_a=np.ones(JOINT_COUNT),
-            pos_rad=row["pos"].astype(np.float64),
-        )
+        pos, temperature = (row[name].astype(np.float64) for name in ("pos", "temp"))
+        supply_v = float(row["supply"])
+        return sound_health(t_s, self._enabled, pos, temperature, supply_v)
 
     def write(self, target_rad: Array) -> None:
         """Goes nowhere."""

@@ -9,35 +9,38 @@ import time
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_deploy.manifest import Interface
 from fingers_robot.drivers.sim_packets import STATE, Ask, request
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+from fingers_robot.reading import (
+    Array,
+    DriverInfo,
+    Health,
+    ImuReading,
+    Reading,
+    sound_health,
+)
 
-Array = NDArray[np.float64]
 _START_S, _ANSWER_S = 30.0, 2.0
-TEMPERATURE_C, SUPPLY_V = 40.0, 14.8
 
 
 class SimDriver:
-    """A hand in MuJoCo, over a local socket, in real time or in lockstep.
+    """A hand in MuJoCo, over a local socket.
 
     Args:
         path: path of the simulator's socket.
         interface: of the policy: joint names and limits.
-        lockstep: the simulator only advances when `advance` is called.
 
     Raises:
         ConnectionError: there is no simulator at this path.
     """
 
-    def __init__(self, path: str | Path, interface: Interface, lockstep: bool = False):
+    def __init__(self, path: str | Path, interface: Interface):
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         self._socket.connect(str(path))
-        self._socket.setblocking(lockstep)
-        self._lockstep, self.over = lockstep, False
+        self._socket.setblocking(False)
+        self.over = False
         self._state: np.void | None = None
         self.info = DriverInfo(
             name=f"simulated hand at {path}",
@@ -46,11 +49,6 @@ class SimDriver:
             lowpass_hz=interface.command_path.lowpass_hz,
         )
 
-    def advance(self, t_s: float) -> None:
-        """Lockstep: lets the simulation run up to `t_s`, and takes its state."""
-        self._socket.send(request(Ask.ADVANCE, t_s))
-        self._take(self._socket.recv(STATE.itemsize))
-
     @property
     def state(self) -> np.void | None:
         """The newest packet, with the true pose of the palm, for measurements."""
@@ -58,8 +56,7 @@ class SimDriver:
 
     def read(self) -> Reading | None:
         """As the protocol says."""
-        if not self._lockstep:
-            self._drain()
+        self._drain()
         s = self._state
         return None if s is None else Reading(float(s["t_s"]), s["pos"], s["effort"])
 
@@ -73,16 +70,7 @@ class SimDriver:
         s = self._state
         if s is None:
             return None
-        return Health(
-            t_s=float(s["health_t_s"]),
-            enabled=bool(s["enabled"]),
-            disabled=not s["enabled"],
-            temperature_c=np.full(JOINT_COUNT, TEMPERATURE_C),
-            bus_v=SUPPLY_V,
-            error_code=np.zeros(JOINT_COUNT, np.uint32),
-            effort_limit_a=np.ones(JOINT_COUNT),
-            pos_rad=s["pos"],
-        )
+        return sound_health(float(s["health_t_s"]), bool(s["enabled"]), s["pos"])
 
     def write(self, target_rad: Array) -> None:
         """As the protocol says."""
@@ -145,7 +133,6 @@ class SimulatorProcess:
     Args:
         model: MJCF or MJB file.
         interface: of the policy: joint names and command path.
-        lockstep: advance only when asked.
         seed: seed of the sensor noise.
         lifetime_s: real time after which the simulator ends by itself [s].
 
@@ -157,7 +144,6 @@ class SimulatorProcess:
         self,
         model: str | Path,
         interface: Interface,
-        lockstep: bool = False,
         seed: int = 0,
         lifetime_s: float = 86400.0,
     ):
@@ -174,8 +160,6 @@ class SimulatorProcess:
             f"--lifetime-s={lifetime_s}",
             f"--parent={os.getpid()}",
         ]
-        if lockstep:
-            arguments.append("--lockstep")
         program = [sys.executable, "-m", "fingers_robot.simulator.server"]
         self.process = subprocess.Popen(
             [*program, str(Path(model).absolute()), *arguments],

@@ -13,17 +13,15 @@ class Ask(enum.IntEnum):
 
     TARGET: take these joint targets.
     ENABLE, DISABLE: energize, de-energize.
-    ADVANCE: lockstep only; advance to the time in `t_s`, then answer.
     """
 
     TARGET = 1
     ENABLE = 2
     DISABLE = 3
-    ADVANCE = 4
 
 
-REQUEST = np.dtype([("ask", "<i4"), ("t_s", "<f8"), ("target", "<f8", JOINT_COUNT)])
-"""One request; `target` counts for TARGET and ADVANCE, NaN there: as before."""
+REQUEST = np.dtype([("ask", "<i4"), ("target", "<f8", JOINT_COUNT)])
+"""One request; `target` counts for TARGET."""
 
 STATE = np.dtype(
     [
@@ -38,12 +36,11 @@ STATE = np.dtype(
         ("base_quat", "<f8", 4),
     ]
 )
-"""The simulated hand's state: what its sensors tell, and the true pose of the palm."""
+"""The simulated hand's state: what its sensors measure, and the palm's true pose."""
 
 
-def request(ask: Ask, t_s: float = 0.0, target: NDArray | None = None) -> bytes:
+def request(ask: Ask, target: NDArray | None = None) -> bytes:
     """Packs one request."""
     packet = np.zeros((), REQUEST)
-    packet["ask"], packet["t_s"] = ask, t_s
-    packet["target"] = np.nan if target is None else target
+    packet["ask"], packet["target"] = ask, np.nan if target is None else target
     return packet.tobytes()

@@ -18,15 +18,13 @@ import time
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.drivers.protocol import Imu
 from fingers_robot.drivers.slow_path import SlowPath
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
+from fingers_robot.reading import Array, DriverInfo, Health, ImuReading, Reading
 
-Array = NDArray[np.float64]
 EFFORT_LIMIT_A = 1.0
 LOWPASS_HZ = 3.0
 _SHAPE = (5, 4)

@@ -1,5 +1,6 @@
 """One step of the supervisor's process: read, judge, write, ask the policy, record."""
 
+import dataclasses
 import time
 from collections import deque
 from collections.abc import Callable
@@ -116,8 +117,6 @@ class Core:
         control, skipped = self._control(tick)
         reading, imu, health, error = self._read()
         answer = self._poll(t)
-        if operator == Operator.ARM:
-            self.checks = self._preflight(reading, imu, health, t)
         inputs = Inputs(
             reading=reading,
             imu=imu,
@@ -125,11 +124,16 @@ class Core:
             proposal=None if answer is None else answer.proposal,
             link_open=self._link.open,
             operator=operator,
-            preflight_ok=bool(self.checks) and all(c.passed for c in self.checks),
             driver_error=error,
             skipped_ticks=skipped,
             control_tick=control,
         )
+        if operator == Operator.ARM:
+            self.checks = preflight(
+                self._driver.info, inputs, self._interface, self.limits, t
+            )
+        ready = bool(self.checks) and all(c.passed for c in self.checks)
+        inputs = dataclasses.replace(inputs, preflight_ok=ready)
         self.state, out = step(self.state, inputs, t, self.limits)
         self._apply(out)
         if control >= 0:
@@ -181,17 +185,6 @@ class Core:
                 self.stats.answer.add(t - sent)
                 self._row["answer_s"] = t - sent
         return answer
-
-    def _preflight(
-        self,
-        reading: Reading | None,
-        imu: ImuReading | None,
-        health: Health | None,
-        t: float,
-    ) -> tuple[Check, ...]:
-        return preflight(
-            self._driver.info, reading, imu, health, self._interface, self.limits, t
-        )
 
     def _apply(self, out: Outputs) -> None:
         try:

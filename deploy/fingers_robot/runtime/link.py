@@ -12,21 +12,22 @@ from fingers_robot.safety.types import PolicyFault, Proposal
 _AT_ONCE = 16  # answers that one step of the loop takes
 _ALL = 1 << 30
 
-OBSERVATION = np.dtype(
+QUERY = np.dtype(
     [
         ("challenge", "<u8"),
         ("tick", "<i8"),
         ("t_s", "<f8"),
-        ("pos", "<f8", (JOINT_COUNT,)),
-        ("quat", "<f8", (4,)),
-        ("gyro", "<f8", (3,)),
-        ("target", "<f8", (JOINT_COUNT,)),
-        ("runs", "<i4"),
+        ("joint_pos", "<f8", (JOINT_COUNT,)),
+        ("quat_w", "<f8", (4,)),
+        ("gyro_b", "<f8", (3,)),
+        ("target_rad", "<f8", (JOINT_COUNT,)),
+        ("runs", "?"),
         ("policy", "<i4"),
         ("key", "<i4"),
     ]
 )
 """Supervisor to policy: the fields of `Query`."""
+_FIELDS = QUERY.names or ()
 
 ANSWER = np.dtype(
     [
@@ -90,7 +91,7 @@ class PolicyEnd:
     def wait(self, seconds: float) -> Query | None:
         """Returns the newest query once one has come; None after some time [s]."""
         select.select([self._socket], [], [], seconds)
-        newest, self.open = _newest(self._socket, OBSERVATION.itemsize, _ALL)
+        newest, self.open = _newest(self._socket, QUERY.itemsize, _ALL)
         return decode_query(newest) if newest else None
 
     def send(self, answer: Answer) -> None:
@@ -128,30 +129,13 @@ def _newest(end: socket.socket, size: int, most: int) -> tuple[bytes, bool]:
 
 def encode_query(query: Query) -> bytes:
     """Packs a query."""
-    packet = np.zeros((), OBSERVATION)
-    packet["challenge"], packet["tick"] = query.challenge, query.tick
-    packet["t_s"], packet["pos"] = query.t_s, query.joint_pos
-    packet["quat"], packet["gyro"] = query.quat_w, query.gyro_b
-    packet["target"], packet["runs"] = query.target_rad, query.runs
-    packet["policy"], packet["key"] = query.policy, query.key
-    return packet.tobytes()
+    return np.array(tuple(getattr(query, name) for name in _FIELDS), QUERY).tobytes()
 
 
 def decode_query(data: bytes) -> Query:
     """Unpacks a query."""
-    packet = np.frombuffer(data, OBSERVATION)[0]
-    return Query(
-        tick=int(packet["tick"]),
-        t_s=float(packet["t_s"]),
-        joint_pos=packet["pos"],
-        quat_w=packet["quat"],
-        gyro_b=packet["gyro"],
-        target_rad=packet["target"],
-        runs=bool(packet["runs"]),
-        policy=int(packet["policy"]),
-        key=int(packet["key"]),
-        challenge=int(packet["challenge"]),
-    )
+    values = np.frombuffer(data, QUERY)[0].item()
+    return Query(**dict(zip(_FIELDS, values, strict=True)))
 
 
 def encode_answer(answer: Answer) -> bytes:

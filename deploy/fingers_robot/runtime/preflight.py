@@ -9,7 +9,8 @@ from fingers_deploy.rotations import gravity, tilt, unrotate
 from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
 from fingers_robot.safety.detectors.health import unhealthy
 from fingers_robot.safety.detectors.sensors import valid_imu, valid_joints
-from fingers_robot.safety.limits import Limits
+from fingers_robot.safety.limits import Limits, outside
+from fingers_robot.safety.types import Inputs
 
 FRESH_S = 0.040
 
@@ -24,25 +25,18 @@ class Check:
 
 
 def preflight(
-    info: DriverInfo,
-    reading: Reading | None,
-    imu: ImuReading | None,
-    health: Health | None,
-    interface: Interface,
-    limits: Limits,
-    t: float,
+    info: DriverInfo, inputs: Inputs, interface: Interface, limits: Limits, t: float
 ) -> tuple[Check, ...]:
     """Runs all checks that need no power.
 
     Args:
         info: the driver's.
-        reading: newest sample of the joints.
-        imu: newest sample of the IMU.
-        health: newest slow read-back.
+        inputs: newest samples of joints, IMU and health.
         interface: of the policy.
         limits: of the supervisor.
         t: monotonic time [s].
     """
+    reading, imu, health = inputs.reading, inputs.imu, inputs.health
     checks = [
         _joints(info, interface),
         _filter(info, interface),
@@ -91,11 +85,10 @@ def _power(health: Health) -> str:
 
 
 def _pose(reading: Reading, limits: Limits) -> Check:
-    low, high = limits.factory_rad[:, 0], limits.factory_rad[:, 1]
-    beyond = np.maximum(low - reading.pos_rad, reading.pos_rad - high)
+    beyond = outside(reading.pos_rad, limits.factory_rad)
     worst = int(beyond.argmax())
-    outside = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
-    words = outside if beyond[worst] > 0 else "every joint inside"
+    found = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
+    words = found if beyond[worst] > 0 else "every joint inside"
     passed = valid_joints(reading) and bool(beyond[worst] <= limits.joint_margin_rad)
     return Check("pose within limits", passed, words)
 

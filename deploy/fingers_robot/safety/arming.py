@@ -4,9 +4,9 @@ import enum
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT
+from fingers_robot.reading import Array
 from fingers_robot.safety.limits import Limits
 from fingers_robot.safety.motion import ramp_duration, smooth_ramp
 from fingers_robot.safety.types import Inputs
@@ -17,7 +17,6 @@ from fingers_robot.safety.wiggle import (
     wiggle_target,
 )
 
-Array = NDArray[np.float64]
 ALL_JOINTS = tuple(range(JOINT_COUNT))
 ENABLE_S = 1.0  # longest wait for the hand to confirm that it is energized
 YIELD_S = 0.5  # a standing hand gives a little when it takes its own weight

@@ -3,9 +3,7 @@
 from dataclasses import dataclass
 
 from fingers_robot.safety.table import BY_ID
-from fingers_robot.safety.types import Reaction
-
-Found = dict[str, str]
+from fingers_robot.safety.types import Found, Reaction
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Manifest
+from fingers_robot.reading import Array
 
-Array = NDArray[np.float64]
 _NEVER = float("inf")
 
 # Tilt of V against level that trips, and for how long it must last. Crawling may not
@@ -164,3 +163,13 @@ def intersect(trained: Array, factory: Array, names: tuple[str, ...]) -> Array:
             valid = f"an overlap with the trained {trained[i].tolist()}"
             raise InputError("hand", f"joint limits of {name}", found, valid)
     return np.stack([low, high], axis=1)
+
+
+def outside(rad: Array, limits: Array) -> Array:
+    """max(low − x, x − high): how far outside, negative inside [rad], [20].
+
+    Args:
+        rad: angles or targets, [20].
+        limits: lowest and highest of each, [20, 2].
+    """
+    return np.maximum(limits[:, 0] - rad, rad - limits[:, 1])

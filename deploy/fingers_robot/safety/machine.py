@@ -13,8 +13,8 @@ import enum
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fingers_robot.reading import Array
 from fingers_robot.safety.arming import ALL_JOINTS, Arming, start_arming, step_arming
 from fingers_robot.safety.detectors.body import detect_tilt
 from fingers_robot.safety.detectors.health import detect_health
@@ -37,7 +37,6 @@ from fingers_robot.safety.motion import toward
 from fingers_robot.safety.stopping import Stop, start_stop, step_stop
 from fingers_robot.safety.types import Inputs, Mode, Operator, Outputs, Reaction
 
-Array = NDArray[np.float64]
 ENERGIZED = (Mode.ARMING, Mode.ACTIVE, Mode.STOPPING)
 CONFIRM_TRIES = 4
 

@@ -1,9 +1,9 @@
 """The supervisor's own targets: never a jump."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array
 
 
 def toward(target_rad: Array, goal_rad: Array, step_rad: float) -> Array:

@@ -3,13 +3,12 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from fingers_robot.reading import Array
 from fingers_robot.safety.limits import Limits
 from fingers_robot.safety.motion import smooth_ramp, toward
 from fingers_robot.safety.types import Reaction
 
-Array = NDArray[np.float64]
 _LONGEST = 2.0  # multiple of the settle time after which it is over in any case
 
 

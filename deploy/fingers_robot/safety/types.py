@@ -3,12 +3,10 @@
 import enum
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from fingers_robot.reading import Array, Health, ImuReading, Reading
 
-from fingers_robot.reading import Health, ImuReading, Reading
-
-Array = NDArray[np.float64]
+Found = dict[str, str]
+"""What a step found: row of the table, and what it is in words."""
 
 
 class Mode(enum.IntEnum):

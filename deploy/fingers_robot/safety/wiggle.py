@@ -6,9 +6,8 @@ It finds a wrong joint order, a wrong sign, a left hand, a stuck joint.
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from fingers_robot.reading import Array
 
 AMPLITUDE_RAD = 0.05
 FOLLOWED_RAD = 0.025  # the moved joint must get at least half way

@@ -16,7 +16,6 @@ from fingers_deploy.rotations import multiply
 from fingers_robot.drivers.sim_packets import STATE
 from fingers_robot.simulator.command_path import CommandPath
 
-Array = NDArray[np.float64]
 HEALTH_S = 0.2
 EFFORT_AT_LIMIT_A = 1.0  # the torque limit stands for this current
 _ATTITUDE_NOISE_RAD, _GYRO_NOISE_RAD_S, _ANGLE_NOISE_RAD = 0.002, 0.01, 1e-4

@@ -1,8 +1,7 @@
 """The simulator's process: a simulated hand behind a local socket.
 
-In real time the hand lives by itself, as a real one: it follows the newest targets it
-was given, and when its driver goes away it holds them and waits for the next driver. In
-lockstep it only advances when asked.
+The hand lives in real time by itself, as a real one: it follows the newest targets it
+was given, and when its driver goes away it holds them and waits for the next driver.
 """
 
 import argparse
@@ -37,15 +36,7 @@ class Server:
         self._listener = listener
         self._client: socket.socket | None = None
 
-    def run_lockstep(self) -> None:
-        """Serves one driver until it goes away."""
-        self._listener.settimeout(None)
-        client, _ = self._listener.accept()
-        while (packet := _receive(client)) is not None:
-            if self._take(packet):
-                client.send(self._hand.state().tobytes())
-
-    def run_realtime(self, lifetime_s: float, parent: int = 0) -> None:
+    def run(self, lifetime_s: float, parent: int = 0) -> None:
         """Lives for some time, one driver after the other.
 
         Args:
@@ -82,18 +73,14 @@ class Server:
         if self._client is not None:
             self._send(self._hand.state(offset).tobytes())
 
-    def _take(self, packet: np.void) -> bool:
-        """Does what is asked; returns whether an answer is due."""
+    def _take(self, packet: np.void) -> None:
+        """Does what is asked."""
         ask, target = int(packet["ask"]), packet["target"]
-        if ask in (Ask.TARGET, Ask.ADVANCE) and np.isfinite(target).all():
+        if ask == Ask.TARGET and np.isfinite(target).all():
             self._hand.target_rad = target.copy()
-        if ask in (Ask.ENABLE, Ask.DISABLE) and self._hand.enabled != (
-            ask == Ask.ENABLE
-        ):
-            self._hand.set_enabled(ask == Ask.ENABLE)
-        if ask == Ask.ADVANCE:
-            self._hand.advance(float(packet["t_s"]))
-        return ask == Ask.ADVANCE
+        enable = ask == Ask.ENABLE
+        if ask in (Ask.ENABLE, Ask.DISABLE) and self._hand.enabled != enable:
+            self._hand.set_enabled(enable)
 
     def _accept(self) -> None:
         try:
@@ -142,7 +129,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--lowpass-hz", type=float, default=3.0)
     parser.add_argument("--slew-rad-s", default="2.8", help="one, or each, by commas")
     parser.add_argument("--seed", type=int, default=0)
-    parser.add_argument("--lockstep", action="store_true")
     parser.add_argument("--lifetime-s", type=float, default=86400.0)
     parser.add_argument("--parent", type=int, default=0)
     options = parser.parse_args(arguments)
@@ -163,13 +149,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
         listener.bind(options.socket)
         listener.listen(1)
-        server = Server(hand, listener)
-        if options.lockstep:
-            server.run_lockstep()
-        else:
-            # A real hand does not wait for this computer either.
-            prefer_this_process(PRIORITY + 10)
-            server.run_realtime(options.lifetime_s, options.parent)
+        # A real hand does not wait for this computer either.
+        prefer_this_process(PRIORITY + 10)
+        Server(hand, listener).run(options.lifetime_s, options.parent)
     return 0
 
 

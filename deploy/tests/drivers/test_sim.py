@@ -22,21 +22,17 @@ def interface(marching):
     return marching.manifest.interface
 
 
-def test_lockstep_is_exact_and_repeatable(hand_model, interface):
-    target = np.asarray(interface.initial_target_rad)
-    ends = []
+def test_it_is_exact_and_repeatable(hand_model, interface):
+    target, ends = np.asarray(interface.initial_target_rad), []
     for _ in range(2):
-        with SimulatorProcess(hand_model, interface, lockstep=True, seed=4) as process:
-            driver = SimDriver(process.path, interface, lockstep=True)
-            driver.advance(0.0)
-            assert driver.health().disabled
-            driver.enable()
-            driver.write(target)
-            driver.advance(0.5)
-            assert driver.read().t_s == pytest.approx(0.5)
-            assert driver.health().enabled
-            ends.append(driver.state.tobytes())
-            driver.close()
+        hand = SimulatedHand(hand_model, interface.joint_names, seed=4)
+        assert not hand.state()["enabled"]
+        hand.set_enabled(True)
+        hand.target_rad = target
+        hand.advance(0.5)
+        assert hand.state()["t_s"] == pytest.approx(0.5)
+        assert hand.state()["enabled"]
+        ends.append(hand.state().tobytes())
     assert ends[0] == ends[1]
 
 

@@ -5,9 +5,7 @@ import math
 from fingers_deploy.rotations import gravity, tilt, unrotate
 from fingers_robot.safety.detectors.sensors import valid_imu
 from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs
-
-Found = dict[str, str]
+from fingers_robot.safety.types import Found, Inputs
 
 
 def detect_tilt(

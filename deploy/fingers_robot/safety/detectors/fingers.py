@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT
+from fingers_robot.reading import Array
 from fingers_robot.safety.limits import Limits
 
-Array = NDArray[np.float64]
 FINGERS = 5
 _SHAPE = (FINGERS, JOINT_COUNT // FINGERS)
 

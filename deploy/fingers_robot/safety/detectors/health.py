@@ -4,9 +4,8 @@ import numpy as np
 
 from fingers_robot.reading import Health
 from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs
+from fingers_robot.safety.types import Found, Inputs
 
-Found = dict[str, str]
 EFFORT_TOLERANCE_A = 0.01
 
 ERROR_BITS = {

@@ -6,11 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT
-from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs
-
-Array = NDArray[np.float64]
-Found = dict[str, str]
+from fingers_robot.reading import Array
+from fingers_robot.safety.limits import Limits, outside
+from fingers_robot.safety.types import Found, Inputs
 
 
 def _never() -> Array:
@@ -53,7 +51,7 @@ def detect_joints(
     _lasting(found, "S5", "stalled", memory.stall_s, t, limits.stall_s)
     _lasting(found, "S5", "over-current", memory.over_s, t, limits.over_effort_s)
     _lasting(found, "S8b", "not following", memory.track_s, t, limits.tracking_s)
-    beyond = _beyond(reading.pos_rad, limits)
+    beyond = outside(reading.pos_rad, limits.factory_rad)
     worst = int(beyond.argmax())
     if beyond[worst] > limits.joint_margin_rad:
         found["S8"] = f"joint {worst} {beyond[worst]:.3f} rad outside its limits"
@@ -62,13 +60,7 @@ def detect_joints(
 
 def believable(pos_rad: Array, limits: Limits) -> NDArray[np.bool_]:
     """Which joint angles may be held: those that S8 does not report; not NaN, [20]."""
-    return _beyond(pos_rad, limits) <= limits.joint_margin_rad
-
-
-def _beyond(pos_rad: Array, limits: Limits) -> Array:
-    """How far each joint is outside its factory limits, negative inside [rad]."""
-    low, high = limits.factory_rad[:, 0], limits.factory_rad[:, 1]
-    return np.maximum(low - pos_rad, pos_rad - high)
+    return outside(pos_rad, limits.factory_rad) <= limits.joint_margin_rad
 
 
 def _since(since: Array, holds: NDArray[np.bool_], t: float) -> Array:

@@ -1,9 +1,7 @@
 """L3 loop overrun, L7 clock jump."""
 
 from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs
-
-Found = dict[str, str]
+from fingers_robot.safety.types import Found, Inputs
 
 
 def detect_loop(last_s: float, inputs: Inputs, t: float, limits: Limits) -> Found:

@@ -11,14 +11,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fingers_deploy.manifest import JOINT_COUNT
-from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs, PolicyFault, Proposal
-
-Array = NDArray[np.float64]
-Found = dict[str, str]
+from fingers_robot.reading import Array
+from fingers_robot.safety.limits import Limits, outside
+from fingers_robot.safety.types import Found, Inputs, PolicyFault, Proposal
 
 _MASK = 2**64 - 1
 _KEPT = 4  # challenges that may still be answered
@@ -116,7 +113,7 @@ def _check_target(
     if memory.fresh:
         steps = min(max(memory.answered - memory.tick, 1), _MAX_STEPS)
     step = np.abs(proposed - target_rad).max()
-    beyond, before = _outside(proposed, limits), _outside(target_rad, limits)
+    beyond, before = (outside(x, limits.trained_rad) for x in (proposed, target_rad))
     if proposal.fault == PolicyFault.OUTPUT:
         found["S4"] = "policy output not finite"
     elif not np.isfinite(step):
@@ -127,12 +124,6 @@ def _check_target(
         # Where a hand is armed that leans on its stops, the targets begin outside.
         words = f"{beyond.max():.3f} rad outside the trained limits"
         found["S4"] = f"proposed target {words}"
-
-
-def _outside(target_rad: Array, limits: Limits) -> Array:
-    """How far targets are outside the trained limits, negative inside [rad], [20]."""
-    low, high = limits.trained_rad[:, 0], limits.trained_rad[:, 1]
-    return np.maximum(low - target_rad, target_rad - high)
 
 
 def _age(age_s: float) -> str:

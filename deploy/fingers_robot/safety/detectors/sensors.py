@@ -5,15 +5,11 @@ import math
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from fingers_robot.reading import ImuReading, Reading
+from fingers_robot.reading import Array, ImuReading, Reading
 from fingers_robot.safety.detectors.fingers import FingerMemory, detect_fingers
 from fingers_robot.safety.limits import Limits
-from fingers_robot.safety.types import Inputs, PolicyFault
-
-Array = NDArray[np.float64]
-Found = dict[str, str]
+from fingers_robot.safety.types import Found, Inputs, PolicyFault
 
 MAX_ANGLE_RAD = 7.0  # more than one turn: no joint of a hand gets there
 MAX_GYRO_RAD_S = 40.0  # beyond the range of any IMU in use (2000 °/s)
