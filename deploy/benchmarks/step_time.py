@@ -2,7 +2,7 @@
 
     python deploy/benchmarks/step_time.py --minutes 30
 
-runs so many minutes' worth of control steps, as fast as possible, on one core.
+runs the control steps of so many minutes, as fast as possible, on one core.
 """
 
 import argparse

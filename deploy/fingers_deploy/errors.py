@@ -1,8 +1,8 @@
-"""The errors of this package: input that is refused, told in one sentence."""
+"""The errors of this package: input that is refused, in one sentence."""
 
 
 class InputError(ValueError):
-    """A file, an argument or a device is refused, told in one sentence.
+    """A file, an argument or a device is refused, in one sentence.
 
     Args:
         source: the file or argument in which the value stands.

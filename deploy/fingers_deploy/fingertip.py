@@ -1,6 +1,6 @@
 """Forward kinematics of the finger that presses keys: encoders to its tip in V.
 
-The figures are the vendor's, of the WUJI right hand's middle finger (description
+The numbers are the vendor's, of the WUJI right hand's middle finger (description
 release 2026.04.27): pose of each link in its parent, joints about the link's y axis.
 """
 

@@ -69,7 +69,7 @@ class ObjectTracker:
         """Returns object position, velocity and way to the target in V, [9].
 
         Args:
-            gravity_b: unit vector of gravity in the palm frame, as the IMU tells it.
+            gravity_b: unit vector of gravity in the palm frame, as the IMU measures it.
 
         Raises:
             ValueError: before the first sample.

@@ -43,7 +43,7 @@ class Health:
     """The newest slow read-back, 2 to 5 times a second, on a path of its own.
 
     Attributes:
-        t_s: monotonic time at which the read-back began [s]; what it tells is no older.
+        t_s: monotonic time at which the read-back began [s]; its values are no older.
         enabled: the joints are energized: every one of them, as the hand confirmed it.
         disabled: no joint is energized, as the hand confirmed it.
         temperature_c: joint temperatures [°C], [20].

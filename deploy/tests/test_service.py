@@ -75,7 +75,7 @@ def service(hand_model, marching_dir, tmp_path):
 
 @pytest.fixture
 def manager(tmp_path, monkeypatch):
-    """The socket of a service manager, of which the run is told."""
+    """The socket of a service manager, that the run notifies."""
     path = tmp_path / "notify"
     monkeypatch.setenv("NOTIFY_SOCKET", str(path))
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
@@ -155,9 +155,9 @@ def test_the_manager_waits_for_the_guard(manager, service):
     pipe, process = service
     assert manager.recv(100) == b"READY=1\nWATCHDOG=1"
     os.write(pipe, b"quit\n")
-    while b"WATCHDOG_USEC" not in (told := manager.recv(100)):
-        assert told == b"READY=1\nWATCHDOG=1"
-    assert told == b"WATCHDOG_USEC=%d\nWATCHDOG=1" % round(1e6 * LAST_S)
+    while b"WATCHDOG_USEC" not in (message := manager.recv(100)):
+        assert message == b"READY=1\nWATCHDOG=1"
+    assert message == b"WATCHDOG_USEC=%d\nWATCHDOG=1" % round(1e6 * LAST_S)
     assert process.wait() == 0
 
 

@@ -102,7 +102,7 @@ class KeyPlayer(Player):
         return dataclasses.replace(start, memory=_asking(start.memory, self._state))
 
     def _noted(self, memory: Memory, row: Trace) -> tuple[Memory, Trace]:
-        """Tells the shim what was pressed, and the environment what it asks for."""
+        """Passes what was pressed to the shim, and its request to the environment."""
         pressed = pressed_in(row)
         self._pressed += pressed
         time_s = float(memory.steps) * self.env.dt
@@ -115,16 +115,16 @@ class KeyPlayer(Player):
         return _asking(memory, self._state, waited if same else 0), row
 
     def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
-        """Asks the shim, which is told what the sensors tell."""
-        told = self._read(memory, state)
+        """Asks the shim, which reads what the sensors measure."""
+        sensed = self._read(memory, state)
         reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
-        joint_pos = np.asarray(told.joint_pos) + reference
+        joint_pos = np.asarray(sensed.joint_pos) + reference
         v_quat_b = self.controller.bundle.manifest.interface.v_quat_b
         tip_v = pressing_fingertip(joint_pos, v_quat_b)
         return self.controller.step(
             joint_pos,
-            np.asarray(told.gravity),
-            np.asarray(told.angvel),
+            np.asarray(sensed.gravity),
+            np.asarray(sensed.angvel),
             np.concatenate([self._state.request, tip_v]),
         )
 

@@ -47,7 +47,7 @@ def _left_hand(lab: Lab, rng: np.random.Generator) -> None:
 
 
 def _zeros(lab: Lab, rng: np.random.Generator) -> None:
-    """The cache before the first frame: all zeros, while the slow path tells truth."""
+    """The cache before the first frame: all zeros, unlike the slow path."""
     _fast(lab, lambda pos: np.zeros(20))
 
 

@@ -16,7 +16,7 @@ DEADZONE = 0.08
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """What a command source told last.
+    """What a command source delivered last.
 
     Attributes:
         t_s: monotonic time at which it was known to be so [s].

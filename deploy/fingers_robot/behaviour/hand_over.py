@@ -1,8 +1,8 @@
 """Switching policies: the next one inherits the history that it would have had.
 
 The last control steps are kept in physical terms: measured angles, gravity, rates,
-what gamepad, keys and camera told, and by how much the targets were asked to move. From
-these, the observation history of any policy can be built: with its own reference
+what gamepad, keys and camera delivered, and by how much the targets were asked to move.
+From these, the observation history of any policy can be built: with its own reference
 angles, scales and inputs, and with the previous actions that would have asked for the
 same motion,
 
@@ -31,7 +31,7 @@ class Moment:
         joint_pos: measured angles [rad], [20].
         gravity_b: gravity in the palm frame, [3].
         angvel_b: angular velocity in the palm frame [rad/s], [3].
-        given: what the sources of commands told, by name of the term.
+        given: what the sources of commands delivered, by name of the term.
         asked_rad: asked change of the targets, α·tanh(a), [20].
     """
 

@@ -2,9 +2,11 @@
 
 import os
 import struct
+from functools import partial
 
 from fingers_deploy.errors import InputError
 from fingers_robot.behaviour.command import Frame
+from fingers_robot.waiting import waiting
 
 _EVENT = struct.Struct("<IhBB")
 _BUTTON, _AXIS, _INITIAL = 0x01, 0x02, 0x80
@@ -66,13 +68,7 @@ class Joystick:
 
     def _drain(self, t: float) -> bool:
         """Takes all waiting events; returns whether the gamepad is still there."""
-        while True:
-            try:
-                data = os.read(self._file, _EVENT.size)
-            except BlockingIOError:
-                return True
-            except OSError:
-                return False
+        for data in waiting(partial(os.read, self._file), _EVENT.size):
             if len(data) != _EVENT.size:
                 return False
             self._changed_s = t
@@ -81,3 +77,4 @@ class Joystick:
                 self._axes[number] = max(value / _FULL, -1.0)
             elif kind & ~_INITIAL == _BUTTON:
                 self._buttons[number] = bool(value)
+        return True

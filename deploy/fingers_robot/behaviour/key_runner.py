@@ -69,7 +69,7 @@ class KeyRunner:
         if not outcomes:
             return ""
         if self._source is None:
-            return f"keys: {len(outcomes)} asked for; no --keyboard told which came"
+            return f"keys: {len(outcomes)} asked for; no --keyboard reported which came"
         hits = [outcome.latency_s for outcome in outcomes if outcome.correct]
         median = f", median latency {np.median(hits):.2f} s" if hits else ""
         return f"keys: {len(hits)} of {len(outcomes)} correct{median}"

@@ -2,9 +2,11 @@
 
 import os
 import struct
+from functools import partial
 from typing import Protocol
 
 from fingers_deploy.errors import InputError
+from fingers_robot.waiting import waiting
 
 # struct input_event on a 64-bit system: time (two words), type, code, value.
 _EVENT = struct.Struct("<qqHHi")
@@ -43,13 +45,9 @@ class Keyboard:
     def poll(self) -> tuple[str, ...]:
         """Returns the keys that went down; others than the arrows as `key N`."""
         pressed = []
-        while not self.lost:
-            try:
-                data = os.read(self._file, _EVENT.size)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
+        if self.lost:
+            return ()
+        for data in waiting(partial(os.read, self._file), _EVENT.size):
             if len(data) != _EVENT.size:
                 self.lost = True
                 break

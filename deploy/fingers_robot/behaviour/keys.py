@@ -58,7 +58,7 @@ class KeyState:
     """Where the list has come to.
 
     Attributes:
-        keys: what is left to ask for, the next one first.
+        keys: what remains to be asked for, the next one first.
         asking: a request is under way; else a gap.
         since_s: when request or gap began [s].
         tries: requests of the next key that have timed out.
@@ -125,9 +125,9 @@ def keys_step(
 
 def _decided(state: KeyState, pressed: str, t: float, again: bool) -> KeyState:
     outcome = KeyOutcome(state.keys[0], pressed, t - state.since_s)
-    left = state.keys if again else state.keys[1:]
+    remaining = state.keys if again else state.keys[1:]
     tries = state.tries + 1 if again else 0
-    return KeyState(left, False, t, tries, (*state.outcomes, outcome))
+    return KeyState(remaining, False, t, tries, (*state.outcomes, outcome))
 
 
 def _after(state: KeyState, asking: bool, t: float) -> KeyState:

@@ -37,7 +37,7 @@ class Ramp:
         )
 
     def over(self, t: float) -> bool:
-        """Tells whether the last targets have been reached."""
+        """Whether the last targets have been reached."""
         return t - self.start_s >= self.duration_s
 
 

@@ -1,4 +1,4 @@
-"""What a policy is told beside the hand's own state, term by term of its manifest."""
+"""What a policy reads beside the hand's own state, term by term of its manifest."""
 
 from collections.abc import Mapping
 
@@ -11,11 +11,11 @@ from fingers_deploy.observation import COMMON_TERMS
 
 Array = NDArray[np.float32]
 Given = Mapping[str, NDArray]
-"""What the sources told in one control step, by name of the term."""
+"""What the sources delivered in one control step, by name of the term."""
 
 FINGERTIP = "fingertip_pos"
 OBJECT_TERMS = ("object_pos", "object_vel", "object_to_target")
-"""Terms that a camera tells, as `tracking.ObjectTracker.inputs` orders them."""
+"""Terms that a camera delivers, as `tracking.ObjectTracker.inputs` orders them."""
 
 
 def input_terms(interface: Interface) -> tuple[Term, ...]:
@@ -32,12 +32,13 @@ def reads(interface: Interface, names: tuple[str, ...]) -> bool:
 def inputs_of(interface: Interface, given: Given, joint_pos: ArrayLike) -> Array:
     """The task inputs of one control step, term after term, [n].
 
-    The pressing fingertip follows from the joints. What nobody told, as before the
-    first sample of a camera or while another task ran, is zero: no command, no request.
+    The pressing fingertip follows from the joints. What no source delivered, as before
+    the first sample of a camera or while another task ran, is zero: no command, no
+    request.
 
     Args:
         interface: of the policy.
-        given: what the sources told.
+        given: what the sources delivered.
         joint_pos: measured joint angles [rad], [20].
     """
     parts = [

@@ -71,7 +71,7 @@ def _describe(bundle: Bundle) -> None:
     print(f"observation     {terms}")
     print(f"command         {_ranges(interface.command_ranges)}")
     for option in sources_needed(interface):
-        print(f"told by         {option}")
+        print(f"read from       {option}")
     print(
         f"action          {interface.action.scale_rad:g} rad per step, "
         f"output within ±{interface.action.clip:g}"
@@ -84,7 +84,7 @@ def _describe(bundle: Bundle) -> None:
 
 
 def sources_needed(interface: Interface) -> list[str]:
-    """Options of `run` for what a policy is told beside a command."""
+    """Options of `run` for what a policy reads beside a command."""
     options = {
         ("request",): "--keys or typed `keys …`; key events: --keyboard DEVICE",
         OBJECT_TERMS: "--tracker PATH, a camera's samples",

@@ -30,11 +30,11 @@ def drive(options: Mapping[str, Any], arm: bool, duration_s: float | None) -> in
     Returns:
         The exit status.
     """
-    launcher = Launcher(options, _say)
+    launcher = Launcher(options, say)
     return Console(launcher, arm, duration_s).run()
 
 
-def _say(line: str) -> None:
+def say(line: str) -> None:
     """Prints a line; a terminal that is gone must not end the watch over the hand."""
     try:
         print(line, flush=True)
@@ -77,7 +77,7 @@ class Console:
         """Says once what may be typed, when there is something to type at."""
         if not (self._arm or self._helped) and self._launcher.status:
             self._helped = True
-            _say(HELP)
+            say(HELP)
 
     def _step(self) -> None:
         now, mode = time.monotonic(), self._launcher.status.get("mode")
@@ -129,28 +129,28 @@ class Console:
             for key in keys:
                 self._launcher.send(f"key {key}")
         elif word:
-            _say(HELP)
+            say(HELP)
 
     def _report(self) -> None:
         status = self._launcher.status
         if not status:
             return
-        _say(f"mode {status['mode']}, {status['realtime']}")
+        say(f"mode {status['mode']}, {status['realtime']}")
         for line in status["faults"]:
-            _say(f"  fault {line}")
+            say(f"  fault {line}")
         for name, passed, found in status["checks"]:
-            _say(f"  {'ok  ' if passed else 'FAIL'} {name}: {found}")
+            say(f"  {'ok  ' if passed else 'FAIL'} {name}: {found}")
         timing = status["timing"]
-        _say(
+        say(
             f"  {timing['control_steps']} control steps, {timing['skipped']} skipped, "
             f"{timing['late_over_5ms']} more than 5 ms late; late "
             f"{timing['late_p50_ms']:.1f} / {timing['late_p999_ms']:.1f} / "
             f"{timing['late_max_ms']:.1f} ms (50 %, 99.9 %, worst)"
         )
         if status["recording_error"]:
-            _say(f"  NOT RECORDING: {status['recording_error']}")
+            say(f"  NOT RECORDING: {status['recording_error']}")
         elif status["recording"]:
-            _say(f"  recording {status['recording']}")
+            say(f"  recording {status['recording']}")
 
 
 def _selects(word: str) -> bool:

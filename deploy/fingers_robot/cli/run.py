@@ -10,12 +10,14 @@ from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.behaviour.joystick import QUIET_S
 from fingers_robot.behaviour.keys import ARROWS
-from fingers_robot.cli.console import REFUSED, drive
+from fingers_robot.cli.console import REFUSED, drive, say
 from fingers_robot.cli.options import check_library, check_options, check_sources
 from fingers_robot.drivers.open import KINDS
 from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_robot.runtime.guard import guard_hand
 
+_RUN = "bundles loop_hz mounting runtime joystick sticks plan keys keyboard tracker"
+_DRIVER = "dry_run socket log side serial imu_bus imu_address imu_mount"
 WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
 
 
@@ -56,7 +58,7 @@ def add_run(commands: Any) -> None:
     parser.add_argument(
         "--tracker", metavar="PATH", help="push: local socket for a camera's samples"
     )
-    parser.set_defaults(command=run, plan=None, told=True)
+    parser.set_defaults(command=run, plan=None, with_sources=True)
 
 
 def add_record(commands: Any) -> None:
@@ -78,7 +80,7 @@ def add_record(commands: Any) -> None:
         keys=None,
         keyboard=None,
         tracker=None,
-        told=False,
+        with_sources=False,
     )
 
 
@@ -95,7 +97,7 @@ def run(options: argparse.Namespace) -> int:
     check_options(options)
     # Refused here, before any process starts and any device is opened.
     bundles = [load_bundle(path) for path in options.bundles]
-    if options.told:
+    if options.with_sources:
         check_sources(options, bundles)
     driver = _driver(options)
     with contextlib.ExitStack() as stack:
@@ -105,38 +107,29 @@ def run(options: argparse.Namespace) -> int:
             driver["socket"] = stack.enter_context(simulator).path
         heading = options.heading_hold
         plain = {
-            "bundles": options.bundles,
+            **_taken(options, _RUN),
             "driver": driver,
-            "loop_hz": options.loop_hz,
             "record": None if options.no_record else options.out,
-            "mounting": options.mounting,
             "realtime": not options.no_realtime,
             "wiggle": WIGGLES[options.wiggle],
-            "runtime": options.runtime,
-            "joystick": options.joystick,
             "joystick_quiet_s": options.joystick_quiet,
-            "sticks": options.sticks,
-            "plan": options.plan,
-            "keys": options.keys,
-            "keyboard": options.keyboard,
-            "tracker": options.tracker,
             "heading_hold": heading
             and {"gain": heading[0], "offset_rad_s": heading[1]},
         }
         status = drive(plain, options.arm, options.duration)
         if options.driver == "sim" and status != REFUSED:
-            _tell_distance(driver["socket"], bundles[0].manifest.interface)
+            _print_distance(driver["socket"], bundles[0].manifest.interface)
         return status
 
 
-def _tell_distance(socket: str, interface: Interface) -> None:
+def _print_distance(socket: str, interface: Interface) -> None:
     """Prints where the simulated hand is now; its origin is where it stood first."""
     try:
         x, y = where_the_palm_is(socket, interface)
     except OSError:
         return  # a simulator of the user's own that has ended
     away_m = math.hypot(x, y)
-    print(f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)")
+    say(f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)")
 
 
 def guard(options: argparse.Namespace) -> int:
@@ -196,14 +189,9 @@ def _add_loop(parser: argparse.ArgumentParser) -> None:
 
 
 def _driver(options: argparse.Namespace) -> dict[str, Any]:
-    return {
-        "kind": options.driver,
-        "dry_run": options.dry_run,
-        "socket": options.socket,
-        "log": options.log,
-        "side": options.side,
-        "serial": options.serial,
-        "imu_bus": options.imu_bus,
-        "imu_address": options.imu_address,
-        "imu_mount": options.imu_mount,
-    }
+    return {"kind": options.driver, **_taken(options, _DRIVER)}
+
+
+def _taken(options: argparse.Namespace, names: str) -> dict[str, Any]:
+    """The options that both sides call the same."""
+    return {name: getattr(options, name) for name in names.split()}

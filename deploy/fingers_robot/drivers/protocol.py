@@ -52,11 +52,11 @@ class Driver(Protocol):
         ...
 
     def enable(self) -> None:
-        """Asks for power; `health().enabled` tells when the hand confirmed it."""
+        """Asks for power; `health().enabled` says when the hand confirmed it."""
         ...
 
     def disable(self) -> None:
-        """Asks for power off; `health().disabled` tells when the hand confirmed it."""
+        """Asks for power off; `health().disabled` says when the hand confirmed it."""
         ...
 
     def close(self) -> None:

@@ -21,6 +21,7 @@ from fingers_robot.reading import (
     Reading,
     sound_health,
 )
+from fingers_robot.waiting import waiting
 
 _START_S, _ANSWER_S = 30.0, 2.0
 
@@ -95,17 +96,10 @@ class SimDriver:
 
     def _drain(self) -> None:
         """Takes the newest packet; older ones are of no use."""
-        while True:
-            try:
-                data = self._socket.recv(STATE.itemsize)
-            except BlockingIOError:
-                return
-            self._take(data)
-
-    def _take(self, data: bytes) -> None:
-        if len(data) != STATE.itemsize:
-            raise ConnectionError("the simulator has gone")
-        self._state = np.frombuffer(data, STATE)[0]
+        for data in waiting(self._socket.recv, STATE.itemsize):
+            if len(data) != STATE.itemsize:
+                raise ConnectionError("the simulator has gone")
+            self._state = np.frombuffer(data, STATE)[0]
 
 
 def where_the_palm_is(path: str | Path, interface: Interface) -> tuple[float, float]:

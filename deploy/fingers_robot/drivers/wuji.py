@@ -11,7 +11,7 @@ What this driver must know about that library:
 - `Hand()` starts a check for upgrades in the background where standard error is a
   terminal; it needs no network to work.
 - Firmware before 1.1 lets a question for its serial number run out after 3 s; before
-  1.2 it tells no efforts, and reading them raises.
+  1.2 it reports no efforts, and reading them raises.
 """
 
 import time
@@ -29,7 +29,7 @@ EFFORT_LIMIT_A = 1.0
 LOWPASS_HZ = 3.0
 _SHAPE = (5, 4)
 _SIDES = {0: "right", 1: "left"}
-_TELLS_SERIAL = (1, 1)
+_REPORTS_SERIAL = (1, 1)
 
 
 class WujiDriver:
@@ -128,9 +128,9 @@ class WujiDriver:
             raise InputError("hand", "handedness", found, side)
 
     def _serial(self) -> str:
-        """Serial number; firmware before 1.1 does not tell it, after long asking."""
+        """Serial number; firmware before 1.1 does not report it, after long asking."""
         version = int(self._hand.get_full_system_firmware_version())
-        if (version & 0xFF, version >> 8 & 0xFF) < _TELLS_SERIAL:
+        if (version & 0xFF, version >> 8 & 0xFF) < _REPORTS_SERIAL:
             return "of unknown serial number"
         return str(self._hand.get_product_sn())
 

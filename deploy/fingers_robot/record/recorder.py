@@ -32,7 +32,7 @@ from fingers_robot.record.row import (
     schema_text,
 )
 
-MAX_FILE_BYTES = 49_000_000  # what is left to write then makes it no 50 MB
+MAX_FILE_BYTES = 49_000_000  # what is still to be written then makes it no 50 MB
 _MAX_WAITING = 5000
 _FLUSH_S = 1.0
 _STRING = "string data\n"
@@ -92,7 +92,7 @@ class Recorder:
         self._put(self._events, t_s, encode_string(line))
 
     def close(self, summary: Mapping[str, str] | None = None) -> None:
-        """Writes what is left and closes the file."""
+        """Writes what still waits and closes the file."""
         self._summary = dict(summary or {}) | {"dropped_rows": str(self.dropped)}
         self._queue.put(None)
         self._thread.join(timeout=10.0)

@@ -7,6 +7,7 @@ from typing import Any
 
 from fingers_robot.behaviour.keys import ARROWS
 from fingers_robot.safety.types import Operator
+from fingers_robot.waiting import waiting
 
 _LONGEST = 65536
 _AT_ONCE = 64  # words that one step of the loop takes
@@ -33,13 +34,7 @@ class ConsoleLink:
         A console that is gone counts as an operator who wants to stop and quit.
         """
         action = Operator.NONE
-        for _ in range(_AT_ONCE):
-            try:
-                data = self._socket.recv(_LONGEST)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
+        for data in waiting(self._socket.recv, _LONGEST, _AT_ONCE):
             if not data:
                 self.quitting = True
                 return Operator.STOP
@@ -55,7 +50,7 @@ class ConsoleLink:
                 action = action if action == Operator.STOP else asked
         return action
 
-    def tell(self, status: dict[str, Any]) -> None:
+    def report(self, status: dict[str, Any]) -> None:
         """Sends a status; one for which there is no room is lost."""
         try:
             self._socket.send(json.dumps(status).encode("ascii"))

@@ -18,6 +18,7 @@ from typing import Any
 from fingers_deploy.bundle import load_bundle
 from fingers_robot.runtime.guard import guard_hand
 from fingers_robot.runtime.link import make_link
+from fingers_robot.waiting import waiting
 
 SILENCE_S = 1.0
 START_S = 30.0
@@ -45,7 +46,7 @@ class Launcher:
         text = json.dumps(options)
         self.policy = _start("policy_process", text, policy)
         self.supervisor = _start("supervisor_process", text, supervisor, console)
-        self._heard_s = time.monotonic() + START_S
+        self._status_s = time.monotonic() + START_S
         self._late = False
         self._notify = os.environ.get("NOTIFY_SOCKET", "")
 
@@ -59,17 +60,11 @@ class Launcher:
     def poll(self, wait_s: float) -> bool:
         """Takes the statuses that come; returns whether the supervisor still runs."""
         select.select([self._console], [], [], wait_s)
-        while True:
-            try:
-                data = self._console.recv(65536)
-            except BlockingIOError:
-                break
-            except OSError:
-                data = b""
+        for data in waiting(self._console.recv, 65536):
             if not data:
                 return False
             self._take(json.loads(data))
-        if time.monotonic() - self._heard_s > SILENCE_S:
+        if time.monotonic() - self._status_s > SILENCE_S:
             self._say("the supervisor is silent: killed")
             self.supervisor.kill()
             return False
@@ -103,7 +98,7 @@ class Launcher:
 
     def _take(self, status: dict[str, Any]) -> None:
         before, self.status = self.status, status
-        self._heard_s = time.monotonic()
+        self._status_s = time.monotonic()
         for line in status["events"]:
             self._say(line)
         if status["recording_error"] and not before.get("recording_error"):
@@ -138,7 +133,7 @@ def _start(module: str, text: str, *ends: socket.socket) -> subprocess.Popen:
 
 
 def notify(path: str, message: str) -> None:
-    """Tells systemd something over its socket; says nothing if nobody listens."""
+    """Notifies systemd over its socket; does nothing if nobody listens."""
     address = "\0" + path[1:] if path.startswith("@") else path
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
         try:

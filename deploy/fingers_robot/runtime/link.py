@@ -8,9 +8,9 @@ import numpy as np
 from fingers_deploy.manifest import JOINT_COUNT
 from fingers_robot.behaviour.exchange import COMMANDS, Answer, Query
 from fingers_robot.safety.types import PolicyFault, Proposal
+from fingers_robot.waiting import EVERY, waiting
 
 _AT_ONCE = 16  # answers that one step of the loop takes
-_ALL = 1 << 30
 
 QUERY = np.dtype(
     [
@@ -91,7 +91,7 @@ class PolicyEnd:
     def wait(self, seconds: float) -> Query | None:
         """Returns the newest query once one has come; None after some time [s]."""
         select.select([self._socket], [], [], seconds)
-        newest, self.open = _newest(self._socket, QUERY.itemsize, _ALL)
+        newest, self.open = _newest(self._socket, QUERY.itemsize, EVERY)
         return decode_query(newest) if newest else None
 
     def send(self, answer: Answer) -> None:
@@ -113,13 +113,7 @@ def _send(end: socket.socket, data: bytes) -> bool:
 def _newest(end: socket.socket, size: int, most: int) -> tuple[bytes, bool]:
     """Newest of at most `most` waiting packets, and whether the other end is there."""
     newest = b""
-    for _ in range(most):
-        try:
-            data = end.recv(size)
-        except BlockingIOError:
-            break
-        except OSError:
-            data = b""
+    for data in waiting(end.recv, size, most):
         if len(data) != size:
             # Nothing means that the other end is closed; half a packet is none.
             return newest, len(data) > 0

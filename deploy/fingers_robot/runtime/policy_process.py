@@ -67,7 +67,7 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
 def _tracker(
     options: Mapping[str, Any], interfaces: Sequence[Interface]
 ) -> TrackerPort | None:
-    """Opens the socket of a camera, where a policy reads what it tells."""
+    """Opens the socket of a camera, where a policy reads what it sees."""
     readers = [x for x in interfaces if reads(x, OBJECT_TERMS)]
     if not readers or not options.get("tracker"):
         return None

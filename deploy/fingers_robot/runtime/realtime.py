@@ -11,7 +11,7 @@ SWITCH_S = 5e-4  # longest time for which a thread keeps the interpreter
 
 
 def resident_mb(process: int | str = "self") -> float:
-    """Memory of a process that is in RAM [MB]; zero where Linux does not tell."""
+    """Memory of a process that is in RAM [MB]; zero where Linux does not report it."""
     try:
         with open(f"/proc/{process}/statm", encoding="ascii") as file:
             pages = int(file.read().split()[1])

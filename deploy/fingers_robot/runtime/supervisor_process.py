@@ -113,7 +113,7 @@ class Supervisor:
         tripped: set[str] = set()
         try:
             ticker = Ticker(self._period_s)
-            told = ticker.start_s
+            reported_s = ticker.start_s
             while not (self._console.quitting and self._core.over):
                 tick = ticker.wait()
                 operator = self._console.poll()
@@ -124,14 +124,14 @@ class Supervisor:
                     operator = Operator.STOP
                 out = self._core.tick(tick, operator)
                 tripped |= {f.id for f in self._core.state.faults}
-                if out.events or out.alarm or tick.t_s - told >= STATUS_S:
-                    told = tick.t_s
-                    self._console.tell(self._status(realtime, out.events, out.alarm))
+                if out.events or out.alarm or tick.t_s - reported_s >= STATUS_S:
+                    reported_s = tick.t_s
+                    self._console.report(self._status(realtime, out.events, out.alarm))
                 if self._console.quitting and out.alarm:
                     return 5
                 if self._driver.over:
                     over = (*out.events, "the recording is over")
-                    self._console.tell(self._status(realtime, over, alarm=False))
+                    self._console.report(self._status(realtime, over, alarm=False))
                     break
         finally:
             self._close(realtime)

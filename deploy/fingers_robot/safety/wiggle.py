@@ -3,7 +3,7 @@
 It finds a wrong joint order, a wrong sign, a left hand, a stuck joint.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -74,15 +74,7 @@ def step_wiggle(
     elapsed = t - wiggle.start_s
     if elapsed >= _OUT_S and not wiggle.checked:
         problem = _judge(wiggle, pos_rad)
-        wiggle = Wiggle(
-            wiggle.joints,
-            wiggle.start_s,
-            wiggle.base_rad,
-            wiggle.pose_rad,
-            wiggle.sign,
-            checked=True,
-        )
-        return wiggle, problem
+        return replace(wiggle, checked=True), problem
     if elapsed >= _OUT_S + _BACK_S:
         rest = wiggle.joints[1:]
         return start_wiggle(rest, wiggle.base_rad, pos_rad, t, limits), ""

@@ -98,7 +98,7 @@ class SimulatedHand:
             self.step()
 
     def state(self, offset_s: float = 0.0) -> NDArray[np.void]:
-        """Returns what the sensors tell now.
+        """Returns what the sensors measure now.
 
         Args:
             offset_s: added to the time of the physics to give the clock's time [s].

@@ -18,6 +18,7 @@ from fingers_robot.drivers.sim_packets import REQUEST, Ask
 from fingers_robot.runtime.realtime import PRIORITY, prefer_this_process
 from fingers_robot.runtime.signals import ignore_interrupts
 from fingers_robot.simulator.hand import SimulatedHand
+from fingers_robot.waiting import waiting
 
 STATE_S = 0.002
 _WAIT_S = 0.05
@@ -60,15 +61,12 @@ class Server:
     def _serve_one_state(self, offset: float) -> None:
         if self._client is None:
             self._accept()
-        while self._client is not None:
-            try:
-                packet = _receive(self._client)
-            except BlockingIOError:
-                break
-            if packet is None:
-                self._drop()
-            else:
-                self._take(packet)
+        if self._client is not None:
+            for data in waiting(self._client.recv, REQUEST.itemsize):
+                if len(data) != REQUEST.itemsize:
+                    self._drop()
+                    break
+                self._take(np.frombuffer(data, REQUEST)[0])
         self._hand.advance(time.monotonic() - offset)
         if self._client is not None:
             self._send(self._hand.state(offset).tobytes())
@@ -102,17 +100,6 @@ class Server:
         if self._client is not None:
             self._client.close()
             self._client = None
-
-
-def _receive(client: socket.socket) -> np.void | None:
-    """Returns one request; None when the driver has gone."""
-    try:
-        data = client.recv(REQUEST.itemsize)
-    except ConnectionError:
-        return None
-    if len(data) != REQUEST.itemsize:
-        return None
-    return np.frombuffer(data, REQUEST)[0]
 
 
 def _numbers(text: str) -> list[float]:

@@ -57,7 +57,7 @@ def test_another_key_is_a_miss():
 def test_without_a_keyboard_requests_end_by_their_time_out():
     runner = KeyRunner(("left", "down"))
     assert names(play(runner, Typed(), 400)) == ["left", "down"]
-    assert runner.story() == "keys: 2 asked for; no --keyboard told which came"
+    assert runner.story() == "keys: 2 asked for; no --keyboard reported which came"
 
 
 def test_while_it_may_not_ask_nothing_is_asked_and_nothing_is_lost():

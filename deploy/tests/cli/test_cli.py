@@ -248,8 +248,8 @@ def test_a_disk_that_takes_no_more_is_told_at_once(hand_model, marching_dir, tmp
         check=False,
         preexec_fn=_small_files,
     )
-    before, told, _ = done.stdout.partition("NOT RECORDING: ")
-    assert told and "the run goes on" in done.stdout
+    before, warning, _ = done.stdout.partition("NOT RECORDING: ")
+    assert warning and "the run goes on" in done.stdout
     assert "control steps" not in before  # that is the report at the end
     assert done.returncode == 0 and done.stderr == ""
 

@@ -111,13 +111,13 @@ def test_timing_quantiles_and_counts():
     assert timing.worst_s == 7.0 and timing.count == 5002
 
 
-def test_histograms_are_told_without_their_empty_bins():
+def test_histograms_are_found_without_their_empty_bins():
     stats = LoopStats()
     for late_s in (0.00025, 0.00021, 0.0071, 3.0):
         stats.step(late_s, 0, late_s)
-    told = stats.histograms()
-    assert told["late_histogram"] == "0.2: 2, 7.1: 1, 100.0: 1"
-    assert told["gap_histogram"] == told["answer_histogram"] == ""
+    found = stats.histograms()
+    assert found["late_histogram"] == "0.2: 2, 7.1: 1, 100.0: 1"
+    assert found["gap_histogram"] == found["answer_histogram"] == ""
 
 
 def test_more_than_one_percent_of_late_steps_warns():
@@ -208,7 +208,7 @@ def test_console_actions_and_its_loss():
     for word in ("policy 3", "nonsense", "arm"):
         right.send(word.encode())
     assert console.poll() == Operator.ARM and console.selected == 3
-    console.tell({"mode": "active"})
+    console.report({"mode": "active"})
     assert right.recv(100) == b'{"mode": "active"}'
     right.close()
     assert console.poll() == Operator.STOP and console.quitting
@@ -242,7 +242,7 @@ def test_a_hand_that_cannot_be_opened_is_said_to_need_its_battery_cut(
     assert not safe and "gave up" in words and "CUT THE BATTERY" in words
 
 
-def test_systemd_is_told(tmp_path):
+def test_systemd_is_found(tmp_path):
     path = str(tmp_path / "notify")
     with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
         end.bind(path)

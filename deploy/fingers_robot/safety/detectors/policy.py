@@ -87,7 +87,7 @@ def detect_policy(
 
 
 def steps_behind(change_rad: Array, limits: Limits) -> int:
-    """Control steps of motion left over after one step of α toward a proposal.
+    """Control steps of motion that remain after one step of α toward a proposal.
 
     A late policy answers twice at once; what the first answer asked for comes in the
     second one, and the targets catch up in the next steps of the loop. So there is one
