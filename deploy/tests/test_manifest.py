@@ -210,7 +210,7 @@ def test_what_is_not_strict_json_is_refused(text):
     _refusal(text)
 
 
-def test_another_schema_is_told_before_its_fields(table):
+def test_another_schema_is_refused_before_its_fields(table):
     text = _edit(json.loads(_edit(table, ("schema_version",), 2)), ("new",), 1)
     assert _refusal(text).field == "schema_version"
 

@@ -50,8 +50,8 @@ def make_link() -> tuple[socket.socket, socket.socket]:
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
-class SupervisorEnd:
-    """The supervisor's end; never blocks.
+class _End:
+    """One end of the link; sending never blocks.
 
     Args:
         end: the socket.
@@ -62,9 +62,22 @@ class SupervisorEnd:
         end.setblocking(False)
         self.open = True
 
+    def _put(self, data: bytes) -> None:
+        """Sends a packet; one for which there is no room is lost."""
+        try:
+            self._socket.send(data)
+        except BlockingIOError:
+            return
+        except OSError:
+            self.open = False
+
+
+class SupervisorEnd(_End):
+    """The supervisor's end; never blocks."""
+
     def send(self, query: Query) -> None:
         """Sends a query; one that the policy has no room for is lost."""
-        self.open = _send(self._socket, encode_query(query)) and self.open
+        self._put(encode_query(query))
 
     def poll(self) -> Answer | None:
         """Returns the newest answer since the last call.
@@ -76,17 +89,8 @@ class SupervisorEnd:
         return decode_answer(newest) if newest else None
 
 
-class PolicyEnd:
-    """The policy's end.
-
-    Args:
-        end: the socket.
-    """
-
-    def __init__(self, end: socket.socket):
-        self._socket = end
-        end.setblocking(False)
-        self.open = True
+class PolicyEnd(_End):
+    """The policy's end."""
 
     def wait(self, seconds: float) -> Query | None:
         """Returns the newest query once one has come; None after some time [s]."""
@@ -96,18 +100,7 @@ class PolicyEnd:
 
     def send(self, answer: Answer) -> None:
         """Sends an answer; a supervisor that does not read will miss its lease."""
-        self.open = _send(self._socket, encode_answer(answer)) and self.open
-
-
-def _send(end: socket.socket, data: bytes) -> bool:
-    """Sends a packet if there is room; returns whether the other end is there."""
-    try:
-        end.send(data)
-    except BlockingIOError:
-        return True
-    except OSError:
-        return False
-    return True
+        self._put(encode_answer(answer))
 
 
 def _newest(end: socket.socket, size: int, most: int) -> tuple[bytes, bool]:

@@ -69,7 +69,7 @@ def test_a_key_in_a_gap_decides_nothing():
 
 
 @pytest.mark.parametrize("retries", [0, 2])
-def test_time_outs_are_retried_as_often_as_told(retries):
+def test_time_outs_are_retried_as_often_as_asked(retries):
     times = KeyTimes(idle_s=0.1, timeout_s=0.3, retries=retries)
     state, _ = play(("up", "left"), after(9.0, str), times)
     assert [o.asked for o in state.outcomes] == ["up"] * (retries + 1) + ["left"] * (

@@ -16,7 +16,7 @@ from fingers_robot.record import read_log
 from fingers_robot.safety import Mode
 
 
-def test_check_tells_what_a_bundle_needs(bundle_dir, capsys):
+def test_check_prints_what_a_bundle_needs(bundle_dir, capsys):
     main(["check", str(bundle_dir)])
     said = capsys.readouterr().out
     for word in (
@@ -236,7 +236,7 @@ def _small_files():
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))
 
 
-def test_a_disk_that_takes_no_more_is_told_at_once(hand_model, marching_dir, tmp_path):
+def test_a_full_disk_is_reported_at_once(hand_model, marching_dir, tmp_path):
     program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--out", str(tmp_path)]
     done = subprocess.run(

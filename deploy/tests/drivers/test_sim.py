@@ -141,6 +141,6 @@ def test_bad_models_are_refused_in_one_sentence(
     assert "\n" not in str(caught.value)
 
 
-def test_the_process_tells_why_it_refuses(interface, tmp_path):
+def test_the_process_says_why_it_refuses(interface, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         SimulatorProcess(tmp_path / "nowhere.xml", interface)

@@ -139,7 +139,7 @@ def test_values_freeze_silently_but_the_slow_path_tells(library, driver):
     assert _wait(raises, 10.0)
 
 
-def test_heat_derates_the_fake_and_is_told(library, driver, bundle):
+def test_heat_derates_the_fake_and_is_reported(library, driver, bundle):
     library.DEVICE.temperature[2, 1] = 86.0
     assert library.DEVICE.effective_effort_limit[2, 1] == pytest.approx(0.7)
     assert _wait(

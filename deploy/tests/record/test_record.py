@@ -190,7 +190,7 @@ def test_no_file_is_larger_than_50_mb(tmp_path):
     assert recorder.dropped == 0 and 48e6 < size < 50e6
 
 
-def test_a_full_disk_is_told_and_stops_nothing(tmp_path, monkeypatch):
+def test_a_full_disk_is_reported_and_stops_nothing(tmp_path, monkeypatch):
     recorder = Recorder(tmp_path, "run", JOINTS, {}, time.monotonic())
 
     def full(data):

@@ -365,7 +365,7 @@ def test_a_command_without_an_age_is_a_lost_command(rig):
     assert {f.id for f in rig.state.faults} == {"S10"}
 
 
-def test_a_fault_told_by_the_policy_never_moves_the_target(rig):
+def test_a_fault_reported_by_the_policy_never_moves_the_target(rig):
     rig.fault = lambda i, t: _proposal(fault=PolicyFault.OUTPUT)(i)
     while rig.state.mode == Mode.ACTIVE:
         before = rig.out.target_rad
