@@ -20,11 +20,15 @@ from fingers_mjx.evaluation.files import summary_document
 from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
 from fingers_mjx.evaluation.stats import paired_difference
+from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports.page import commit_here
-from fingers_mjx.runs.setup import Setup, identity, make_env
+from fingers_mjx.runs.setup import (
+    Setup,
+    make_env,
+)
 from fingers_mjx.training.progress import OnProgress
-from fingers_mjx.training.train import Result, train
+from fingers_mjx.training.train import Result, Start, train
 
 MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")
 """Of episodes with the task's own commands."""
@@ -61,18 +65,13 @@ def train_on(
     Raises:
         InputError: settings or a hand with which there is no environment.
     """
-    env = make_env(
-        dataclasses.replace(setup, hand=hand),
-        setup.train.num_envs,
-        setup.train.backend,
-    )
+    setup = dataclasses.replace(setup, hand=hand)
+    env = make_env(setup, setup.train.num_envs, setup.train.backend)
     return train(
-        lambda num_envs: env,
-        setup.train,
+        env,
+        setup,
         path,
-        env_config=setup.env,
-        hand=hand,
-        warm_start=warm,
+        start=Start(warm_start=warm),
         identity=identity(env),
         on_progress=say,
     )

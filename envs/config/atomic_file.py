@@ -6,6 +6,9 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
+PARTIAL = ".part-"
+"""Beginning of the names of files that are not whole; a killed process leaves them."""
+
 
 def write_atomic(path: Path, content: str | bytes) -> Path:
     """Writes a whole file, readable by all, or leaves the old one.
@@ -62,7 +65,7 @@ def sync(path: Path) -> None:
 @contextmanager
 def _beside(path: Path) -> Iterator[Path]:
     """Yields an empty temporary file next to `path` and removes it at the end."""
-    handle, name = tempfile.mkstemp(prefix=".", suffix=path.name, dir=path.parent)
+    handle, name = tempfile.mkstemp(prefix=PARTIAL, suffix=path.name, dir=path.parent)
     os.close(handle)
     try:
         yield Path(name)

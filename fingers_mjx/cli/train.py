@@ -60,31 +60,24 @@ def add(commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Trains, and reports on stdout."""
-    from fingers_mjx.ppo.state import train_template
-    from fingers_mjx.runs.setup import identity, make_env
+    from fingers_mjx.policy.interface import identity
+    from fingers_mjx.runs.setup import make_env
     from fingers_mjx.training.progress import reporter
-    from fingers_mjx.training.train import train
-    from fingers_mjx.training.warm_start import started_from
+    from fingers_mjx.training.train import Start, train
 
     _check_words(args.settings)
     check_directory("--out", args.out)
     resume = args.resume is not None
     setup = _resumed(args) if resume else _new(args)
     path = args.resume or args.out or _default_dir(setup.train)
-    # Made here for its identity, and handed over: nothing is built twice.
     env = make_env(setup, setup.train.num_envs, setup.train.backend)
-    if args.warm_start is not None:  # refused before anything is written
-        started_from(train_template(env, setup.train.ppo), env, args.warm_start)
     with reporter(sys.stdout) as show:
         show({"event": "note", "text": _headline(setup.train, path)})
         result = train(
-            lambda num_envs: env,
-            setup.train,
+            env,
+            setup,
             path,
-            env_config=setup.env,
-            hand=setup.hand,
-            resume=resume,
-            warm_start=args.warm_start,
+            start=Start(resume, args.warm_start),
             identity=identity(env),
             on_progress=show,
         )

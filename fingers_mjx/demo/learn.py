@@ -14,9 +14,14 @@ from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.export.export import ExportReport, brax_weights
 from fingers_mjx.export.run import export_run
 from fingers_mjx.policy.actor import Network, load_policy
+from fingers_mjx.policy.interface import identity
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import init_train_state, make_learner
-from fingers_mjx.runs.setup import Setup, identity, make_env, new_setup
+from fingers_mjx.runs.setup import (
+    Setup,
+    make_env,
+    new_setup,
+)
 from fingers_mjx.training.train import train
 
 SEED = 1
@@ -95,15 +100,7 @@ def untrained(setup: Setup, env: BatchEnv) -> Network:
 
 def _train(run_dir: Path, setup: Setup, env: BatchEnv, screen: Screen) -> None:
     with screen.reporting() as show:
-        train(
-            lambda num_envs: env,
-            setup.train,
-            run_dir,
-            env_config=setup.env,
-            hand=setup.hand,
-            identity=identity(env),
-            on_progress=show,
-        )
+        train(env, setup, run_dir, identity=identity(env), on_progress=show)
 
 
 def _measure(

@@ -9,13 +9,12 @@ import jax
 import numpy as np
 from jaxtyping import Float
 
+from fingers_deploy import BundleError
 from fingers_deploy.bundle import PARITY_TOLERANCE
 from fingers_deploy.manifest import Interface, Provenance
-from fingers_deploy.network import read_network
-from fingers_deploy.policy import OnnxPolicy, Policy
-from fingers_deploy.wire import read_model
+from fingers_deploy.policy import OnnxPolicy
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
-from fingers_mjx.export.onnx_graph import PolicyWeights, build_graph
+from fingers_mjx.export.onnx_graph import PolicyWeights
 
 Apply = Callable[[Float[np.ndarray, "B N"]], Any]
 
@@ -49,7 +48,6 @@ def export_policy(
     task: str,
     interface: Interface,
     provenance: Provenance,
-    seed: int = 0,
 ) -> ExportReport:
     """Writes the bundle of a trained actor after comparing it with JAX.
 
@@ -68,30 +66,33 @@ def export_policy(
         task: name of the task.
         interface: what the policy reads and what its output means.
         provenance: how it was made.
-        seed: seed of the random observations.
 
     Raises:
-        ExportError: a difference above the tolerance, or weights that are not finite
-            or do not fit each other.
-        BundleError: fields that do not fit each other or the weights.
+        ExportError: a difference above the tolerance, or weights or fields that are
+            not finite or do not fit each other.
         OSError: the disk is full or not writable.
     """
-    obs = sample_observations(weights, seed)
+    obs = sample_observations(weights)
     mean_action = _evaluate(apply, obs)
     action = np.clip(mean_action, -weights.action_clip, weights.action_clip)
-    allowed = np.full(len(obs), PARITY_TOLERANCE)
-    extreme = slice(OBSERVATIONS, None)
-    allowed[extreme] *= np.maximum(1, np.abs(mean_action[extreme]).max(axis=1))
+    known = obs[:PARITY_ROWS], action[:PARITY_ROWS]
+    try:
+        bundle = encode_bundle(weights, task, interface, provenance, known)
+    except BundleError as error:
+        raise ExportError(str(error)) from error
+    runtimes = {"onnxruntime": OnnxPolicy(bundle.model), "numpy": bundle.network}
+    allowed = _allowed(mean_action)
     differences = {
         name: _compare(name, np.stack(list(map(policy, obs))), action, allowed)
-        for name, policy in _runtimes(weights).items()
+        for name, policy in runtimes.items()
     }
-    known = obs[:PARITY_ROWS], action[:PARITY_ROWS]
-    write_bundle(out_dir, encode_bundle(weights, task, interface, provenance, known))
+    write_bundle(out_dir, bundle)
     return ExportReport(observations=len(obs), **differences)
 
 
-def sample_observations(weights: PolicyWeights, seed: int) -> Float[np.ndarray, "B N"]:
+def sample_observations(
+    weights: PolicyWeights, seed: int = 0
+) -> Float[np.ndarray, "B N"]:
     """Returns 4,096 random observations and 12 extreme ones.
 
     Random: mean + std·n with n standard normal. Extreme: zeros, the mean, and corners
@@ -165,16 +166,12 @@ def brax_apply(
     return apply
 
 
-def _runtimes(weights: PolicyWeights) -> dict[str, Policy]:
-    """Returns the exported graph in both runtimes."""
-    model = build_graph(weights).SerializeToString()
-    try:
-        network = read_network(read_model(model))
-    except ValueError as error:
-        raise ExportError(
-            f"policy weights: found {error}; valid: finite, fitting layers"
-        ) from error
-    return {"onnxruntime": OnnxPolicy(model), "numpy": network}
+def _allowed(mean_action: Float[np.ndarray, "B A"]) -> Float[np.ndarray, " B"]:
+    """Returns the largest difference allowed on each observation."""
+    allowed = np.full(len(mean_action), PARITY_TOLERANCE)
+    extreme = slice(OBSERVATIONS, None)
+    allowed[extreme] *= np.maximum(1, np.abs(mean_action[extreme]).max(axis=1))
+    return allowed
 
 
 def _evaluate(apply: Apply, obs: Float[np.ndarray, "B N"]) -> Float[np.ndarray, "B A"]:

@@ -18,13 +18,12 @@ from fingers_mjx.export.export import (
 )
 from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.actor import read, warm_started
-from fingers_mjx.policy.interface import interface_of
+from fingers_mjx.policy.interface import check_run_interface, interface_of
 from fingers_mjx.ppo.state import make_learner, train_template
 from fingers_mjx.runs.checkpoint import Saved
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
 from fingers_mjx.runs.setup import (
     Setup,
-    check_run_interface,
     config_digest,
     make_env,
     run_setup,
@@ -48,7 +47,7 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
     setup, saved = run_setup(run_dir), read(run_dir)
     env = make_env(setup, 1, "cpu")
     check_run_interface(run_dir, env)
-    weights, apply = _network(setup, run_dir, env)
+    weights, apply = _network(setup, saved, env)
     report = export_policy(
         out_dir,
         weights,
@@ -64,9 +63,9 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
     return report
 
 
-def _network(setup: Setup, run_dir: Path, env: BatchEnv) -> tuple[PolicyWeights, Apply]:
+def _network(setup: Setup, saved: Saved, env: BatchEnv) -> tuple[PolicyWeights, Apply]:
     """Returns the actor's weights, and the actor as training ran it."""
-    train = warm_started(train_template(env, setup.train.ppo), run_dir)
+    train = warm_started(train_template(env, setup.train.ppo), saved)
     actor, normalizer = train.params.policy, train.normalizer
     weights = brax_weights(actor, normalizer, setup.env.action_clip)
     network = make_learner(env, setup.train.ppo).networks.policy_network

@@ -104,14 +104,14 @@ def read(path: Path, say: Callable[[str], None] = print) -> Saved:
     return checkpoint.load(newest)
 
 
-def warm_started(train: TrainState, path: Path) -> TrainState:
-    """Returns the untrained `train` with networks and normalizer of `path`.
+def warm_started(train: TrainState, saved: Saved) -> TrainState:
+    """Returns the untrained `train` with networks and normalizer of a checkpoint.
 
     Raises:
         InputError: if the networks differ, naming the first array.
     """
     template = {"train": {"params": train.params, "normalizer": train.normalizer}}
-    loaded = read(path).part(template)["train"]
+    loaded = saved.part(template)["train"]
     return dataclasses.replace(train, **loaded)
 
 

@@ -1,7 +1,9 @@
 """What lies between a policy and the hand, taken from the environment it trained in."""
 
 import dataclasses
+import hashlib
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from envs.batch import BatchEnv
@@ -16,6 +18,10 @@ from fingers_deploy.manifest import (
     Observation,
     Term,
 )
+from fingers_mjx.runs.directory import RUN_FILE, saved_bound
+
+INTERFACE = "interface"
+"""Name of the interface among what `identity` returns."""
 
 TOLERANCE = 1e-6
 """Largest difference between numbers that count as the same (settling rounds)."""
@@ -47,6 +53,32 @@ def interface_of(env: BatchEnv) -> Interface:
         command_ranges=tuple(pair for term in inputs for pair in term.ranges),
         v_quat_b=stance.q_off,
     )
+
+
+def identity(env: BatchEnv) -> dict[str, Any]:
+    """Returns what a resumed run must share besides its settings.
+
+    The hash of the model is that of its MJCF, which holds all of hand and scene that
+    physics sees; the drive's delay and filter are in the hand's own. The interface is
+    also what an evaluation or export of the run must share.
+    """
+    spec = env.build_scene()
+    spec.compile()
+    return {
+        "hand_sha256": env.hand.sha256,
+        "model_sha256": hashlib.sha256(spec.to_xml().encode()).hexdigest(),
+        INTERFACE: dataclasses.asdict(interface_of(env)),
+    }
+
+
+def check_run_interface(run_dir: Path, env: BatchEnv) -> None:
+    """Refuses a run whose policy reads or moves something else than `env` has.
+
+    Raises:
+        InputError: naming the first field that differs.
+    """
+    saved = saved_bound(run_dir).get("identity", {}).get(INTERFACE, {})
+    check_same(run_dir / RUN_FILE, saved, dataclasses.asdict(interface_of(env)))
 
 
 def check_interface(source: object, found: Interface, ours: Interface) -> None:

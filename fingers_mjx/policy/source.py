@@ -12,11 +12,14 @@ from envs.hand.figures import figures
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_mjx.policy.actor import Network, load_policy
-from fingers_mjx.policy.interface import check_interface, interface_of
+from fingers_mjx.policy.interface import (
+    check_interface,
+    check_run_interface,
+    interface_of,
+)
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE
 from fingers_mjx.runs.setup import (
     Setup,
-    check_run_interface,
     config_digest,
     load_setup,
     make_env,

@@ -19,7 +19,7 @@ import orbax.checkpoint as ocp
 from envs.config.atomic_file import sync
 from envs.errors import InputError
 from fingers_mjx.runs import seal as manifest
-from fingers_mjx.runs.files import room_for
+from fingers_mjx.runs.files import OutOfSpace, room_for
 from fingers_mjx.runs.tree import (
     check_layout,
     describe,
@@ -27,7 +27,6 @@ from fingers_mjx.runs.tree import (
     leaf_names,
     to_host,
 )
-from fingers_mjx.training.errors import OutOfSpace
 
 _TMP, _OLD = ".tmp-", ".old-"
 _MARGIN_BYTES = 1 << 20

@@ -18,14 +18,14 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
-from envs.config.typed import dump_yaml, load_yaml
+from envs.config.atomic_file import PARTIAL
+from envs.config.typed import dump_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, hand_yaml
 from fingers_mjx.runs.files import write_whole
 
-T = TypeVar("T")
 FORMAT = 1
 LOCK = "run.lock"
 RUN_FILE = "run.json"
@@ -83,20 +83,6 @@ def record_run(
     write_whole(path / CONFIG_FILE, text.encode())
 
 
-def saved_config(path: Path, cls: type[T]) -> T:
-    """Returns the configuration that a run was made with, as the dataclass `cls`.
-
-    Args:
-        path: run directory.
-        cls: with the fields `train` (TrainConfig) and `env`.
-
-    Raises:
-        InputError: if `path` is not a run directory that this version can read.
-    """
-    _read_run(path)
-    return load_yaml(cls, path / CONFIG_FILE)
-
-
 def saved_bound(path: Path) -> dict[str, Any]:
     """Returns what a resumed run must share with the run at `path`, by nested names.
 
@@ -148,10 +134,9 @@ def _check_purpose(path: Path, resume: bool) -> None:
         return
     if path.exists() and not path.is_dir():
         raise InputError(path, "", "a file", "a directory to make")
-    files = {HAND_FILE, VERSIONS_FILE, RUN_FILE}
-    ours = {LOCK, "checkpoints", "eval", *files, *(f".{n}.tmp" for n in files)}
+    ours = {LOCK, "checkpoints", "eval", HAND_FILE, VERSIONS_FILE, RUN_FILE}
     names = {p.name for p in path.iterdir()} if path.exists() else set()
-    if names - ours:
+    if any(name not in ours and not name.startswith(PARTIAL) for name in names):
         valid = "a new or empty directory (--resume goes on with a run)"
         raise InputError(path, "", "a directory in use", valid)
 

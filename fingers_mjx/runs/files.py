@@ -8,9 +8,27 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from envs.config.atomic_file import write_atomic
-from fingers_mjx.training.errors import OutOfSpace
 
 FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
+
+
+class OutOfSpace(OSError):
+    """The disk has no room for what should be written (status 4).
+
+    Args:
+        path: what was being written.
+        needed: its size [bytes].
+        free: free space on the disk [bytes].
+    """
+
+    exit_code = 4
+
+    def __init__(self, path: Path, needed: int, free: int):
+        self.path, self.needed, self.free = path, needed, free
+        super().__init__(
+            f"no room for {path}: needs {needed:,} bytes, {free:,} free; "
+            "what was saved before is intact"
+        )
 
 
 @contextmanager
@@ -45,7 +63,7 @@ def is_full(error: BaseException) -> bool:
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Writes a file so that at any moment either all of it is there or the old one.
+    """Writes a file atomically.
 
     Raises:
         OutOfSpace: if the disk is full; the old file is intact.
@@ -55,5 +73,5 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def _free(directory: Path) -> int:
-    """Returns the room left on the disk of `directory` [bytes]."""
+    """Returns the free space on the disk of `directory` [bytes]."""
     return shutil.disk_usage(directory).free

@@ -15,13 +15,10 @@ from envs.config.typed import load_yaml, override
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.registry import get_task, make_batch
-from fingers_mjx.policy.interface import check_same, interface_of
-from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.ppo.config_check import check_config
+from fingers_mjx.ppo.config import TrainConfig, check_config
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
 
 ENV_PREFIX = "env."
-INTERFACE = "interface"
 
 
 @dataclass(frozen=True)
@@ -104,32 +101,6 @@ def make_env(
         auto_reset,
         hand=setup.hand,
     )
-
-
-def identity(env: BatchEnv) -> dict[str, Any]:
-    """Returns what a resumed run must share besides its settings.
-
-    The hash of the model is that of its MJCF, which holds all of hand and scene that
-    physics sees; the drive's delay and filter are in the hand's own. The interface is
-    also what an evaluation or export of the run must share.
-    """
-    spec = env.build_scene()
-    spec.compile()
-    return {
-        "hand_sha256": env.hand.sha256,
-        "model_sha256": hashlib.sha256(spec.to_xml().encode()).hexdigest(),
-        INTERFACE: dataclasses.asdict(interface_of(env)),
-    }
-
-
-def check_run_interface(run_dir: Path, env: BatchEnv) -> None:
-    """Refuses a run whose policy reads or moves something else than `env` has.
-
-    Raises:
-        InputError: naming the first field that differs.
-    """
-    saved = saved_bound(run_dir).get("identity", {}).get(INTERFACE, {})
-    check_same(run_dir / RUN_FILE, saved, dataclasses.asdict(interface_of(env)))
 
 
 def config_digest(directory: Path) -> str:

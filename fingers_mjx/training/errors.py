@@ -44,22 +44,3 @@ class Interrupted(RuntimeError):
             f"stopped after iteration {iteration}; saved in {checkpoint}; "
             "go on with --resume"
         )
-
-
-class OutOfSpace(OSError):
-    """The disk has no room for what should be written (status 4).
-
-    Args:
-        path: what was being written.
-        needed: its size [bytes].
-        free: room left on the disk [bytes].
-    """
-
-    exit_code = 4
-
-    def __init__(self, path: Path, needed: int, free: int):
-        self.path, self.needed, self.free = path, needed, free
-        super().__init__(
-            f"no room for {path}: needs {needed:,} bytes, {free:,} free; "
-            "what was saved before is intact"
-        )

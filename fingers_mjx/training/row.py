@@ -50,8 +50,8 @@ class Window:
         self.timed_s += elapsed_s
         self.timed_iterations += iterations
 
-    def figures(self, names: list[str]) -> dict[str, float]:
-        """Fetches the figures and returns their means."""
+    def means(self, names: list[str]) -> dict[str, float]:
+        """Fetches the sums and returns the mean of each metric."""
         sums: Float[np.ndarray, "k 2"] = np.sum([np.asarray(s) for s in self.sums], 0)
         return dict(means(names, sums))
 

@@ -23,6 +23,7 @@ from fingers_mjx.ppo.state import (
 )
 from fingers_mjx.ppo.totals import Totals
 from fingers_mjx.ppo.update import watched_names
+from fingers_mjx.runs.setup import Setup
 
 HEALTH = (
     "worst_streak",
@@ -109,17 +110,15 @@ class Session:
         return Carry(train, self.env.reset(key_worlds), key)
 
 
-def bound(
-    env: VectorEnv, config: TrainConfig, env_config: Any, identity: Mapping[str, Any]
-) -> dict[str, Any]:
+def bound(env: VectorEnv, setup: Setup, identity: Mapping[str, Any]) -> dict[str, Any]:
     """Returns what a resumed run must share with the saved one.
 
     JAX counts up to its minor version: later ones draw other random numbers and
     compile other programs.
     """
     return {
-        "train": bound_fields(config),
-        "env": to_dict(env_config),
+        "train": bound_fields(setup.train),
+        "env": to_dict(setup.env),
         "observation_size": dict(env.observation_size),
         "action_size": env.action_size,
         "identity": dict(identity),

@@ -7,19 +7,18 @@ from typing import Any
 
 from envs.base import VectorEnv
 from envs.errors import InputError
-from envs.hand.hand_file import HandFile
-from fingers_mjx.ppo.config import TrainConfig, free_fields
-from fingers_mjx.ppo.config_check import check_config
-from fingers_mjx.ppo.state import Carry, strong
+from fingers_mjx.ppo.config import check_config, free_fields
+from fingers_mjx.ppo.state import TrainState, strong, train_template
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
+from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
-from fingers_mjx.training.loop import Desk, Loop
+from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.session import Session, bound
 from fingers_mjx.training.signals import StopSignals
-from fingers_mjx.training.warm_start import started_from
+from fingers_mjx.training.warm_start import completed, started_from
 from fingers_mjx.training.watchdog import Watchdog
 
 TICK_S = 1.0
@@ -43,72 +42,94 @@ class Result:
     metrics: Mapping[str, Any]
 
 
+@dataclass(frozen=True)
+class Start:
+    """How a run begins: afresh unless stated otherwise.
+
+    Attributes:
+        resume: go on from the newest intact checkpoint of the run directory.
+        warm_start: run directory, checkpoint or bundle whose networks the new run
+            starts from (`fingers_mjx.training.warm_start`); all else starts afresh.
+
+    Raises:
+        InputError: both are given.
+    """
+
+    resume: bool = False
+    warm_start: Path | None = None
+
+    def __post_init__(self) -> None:
+        if self.resume and self.warm_start:
+            raise InputError("--warm-start", "", self.warm_start, "without --resume")
+
+
+FRESH = Start()
+
+
 def train(
-    make_env: Callable[[int], VectorEnv],
-    config: TrainConfig,
+    env: VectorEnv,
+    setup: Setup,
     run_dir: Path,
     *,
-    env_config: Any = None,
-    hand: HandFile | None = None,
-    resume: bool = False,
-    warm_start: Path | None = None,
+    start: Start = FRESH,
     identity: Mapping[str, Any] | None = None,
     on_progress: OnProgress = lambda event: None,
 ) -> Result:
-    """Trains until `config.iterations` are done, and writes the run directory.
+    """Trains until `setup.train.iterations` are done, and writes the run directory.
 
     Args:
-        make_env: number of worlds -> batched environment.
-        config: of the run; for a resumed one, as saved (`rundir.saved_config`).
-        run_dir: new or empty directory, or with `resume` that of the run.
-        env_config: configuration of the environment, a dataclass or mapping; written
-            beside `config`, and a resumed run must share it.
-        hand: written beside both.
-        resume: go on from the newest intact checkpoint.
-        warm_start: run directory, checkpoint or bundle whose networks the new run
-            starts from (`fingers_mjx.training.warm_start`); all else starts afresh.
-        identity: JSON-able facts that a resumed run must share besides configuration
-            and sizes, such as the hash of the model and the order of observations.
-        on_progress: gets the events of `fingers_mjx.training.progress`, from any
-            thread.
+        env: `setup.train.num_envs` worlds made from `setup`.
+        setup: settings and hand, written to the run directory; a resumed run must
+            share them, except for the fields that are free.
+        run_dir: new or empty directory, or the one to resume.
+        start: how the run begins.
+        identity: JSON-able facts that a resumed run must share besides the settings
+            (`fingers_mjx.policy.interface.identity`).
+        on_progress: called with the events of `fingers_mjx.training.progress`, from
+            any thread.
 
     Raises:
         InputError: for settings, directories or checkpoints that do not fit, or when
-            contacts were dropped for want of room (`TrainConfig.on_overflow`).
+            contacts were dropped for lack of space (`TrainConfig.on_overflow`).
         Diverged: when too many updates in a row were not finite.
         Interrupted: after SIGINT or SIGTERM, with a checkpoint written.
         OutOfSpace: when the disk is full; earlier checkpoints are intact.
     """
+    config = setup.train
     check_config(config)
-    if resume and warm_start:
-        raise InputError("--warm-start", "", warm_start, "without --resume")
+    learned = _learned(env, setup, start)
     use_compile_cache()
 
     def say(text: str) -> None:
         on_progress({"event": "note", "text": text})
 
     with (
-        open_run(run_dir, resume) as path,
+        open_run(run_dir, start.resume) as path,
         StopSignals(say) as stop,
         Watchdog(path / "hang.txt", config.hang_limit_s) as watchdog,
         Ticker(on_progress, TICK_S) as ticker,
     ):
-        env = make_env(config.num_envs)
-        shared = bound(env, config, env_config, identity or {})
-        if resume:
-            free = {f"env.{name}" for name in free_fields(env_config)}
-            check_bound(path, shared, free)
+        shared = bound(env, setup, identity or {})
+        if start.resume:
+            check_bound(path, shared, {f"env.{x}" for x in free_fields(setup.env)})
         session = Session(env, config)
-        newest = _newest(path, say) if resume else None
-        start = _restored(session, newest) if newest else _fresh(session, warm_start)
-        record_run(path, {"train": config, "env": env_config}, shared, hand)
-        with MetricsLog(path, start[1]) as log:
-            desk = Desk(
-                path, shared, env_config, log, on_progress, stop, watchdog, ticker
+        newest = _newest(path, say) if start.resume else None
+        begin = _restored(session, newest) if newest else _fresh(session, learned)
+        record_run(path, {"train": config, "env": setup.env}, shared, setup.hand)
+        with MetricsLog(path, begin.iteration) as log:
+            services = LoopServices(
+                path, shared, setup.env, log, on_progress, stop, watchdog, ticker
             )
-            saved = Loop(session, desk, *start, saved=newest).run()
+            saved = Loop(session, services, begin).run()
     rows = read_metrics(path / "metrics.jsonl")
     return Result(path, saved, int(saved.name), rows[-1])
+
+
+def _learned(env: VectorEnv, setup: Setup, start: Start) -> TrainState | None:
+    """Reads what a warm start brings, before anything is written."""
+    if start.warm_start is None:
+        return None
+    return started_from(train_template(env, setup.train.ppo), env, start.warm_start)
 
 
 def _newest(path: Path, say: Callable[[str], None]) -> Path | None:
@@ -122,17 +143,16 @@ def _newest(path: Path, say: Callable[[str], None]) -> Path | None:
     return newest
 
 
-def _restored(session: Session, path: Path) -> tuple[Carry, int, float]:
-    """Returns the state saved at `path`, the iterations done and the time they took."""
+def _restored(session: Session, path: Path) -> StartPoint:
+    """Returns the state saved at `path`."""
     saved = checkpoint.load(path)
     carry = strong(saved.into(session.template()))
-    return carry, saved.iteration, saved.meta["trained_s"]
+    return StartPoint(carry, saved.iteration, saved.meta["trained_s"], path)
 
 
-def _fresh(session: Session, warm_start: Path | None) -> tuple[Carry, int, float]:
-    """Returns the state of a new run, with the networks of `warm_start` if given."""
+def _fresh(session: Session, learned: TrainState | None) -> StartPoint:
+    """Returns the state of a new run, with what was `learned` elsewhere."""
     carry = session.start()
-    if warm_start is not None:
-        started = started_from(carry.train, session.env, warm_start)
-        carry = replace(carry, train=strong(started))
-    return carry, 0, 0.0
+    if learned is not None:
+        carry = replace(carry, train=strong(completed(learned, carry.train)))
+    return StartPoint(carry)

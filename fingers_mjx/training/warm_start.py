@@ -14,7 +14,7 @@ from envs.hand.figures import figures
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_deploy.manifest import Interface, Term
-from fingers_mjx.policy.actor import warm_started
+from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import interface_of
 from fingers_mjx.ppo.brax import PPONetworkParams
 from fingers_mjx.ppo.state import TrainState
@@ -29,7 +29,7 @@ _LAYERS = ("MLP_0", "Dense_0")
 
 
 def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
-    """Returns the untrained `train` with what `path` has learned.
+    """Returns `train` with what `path` has learned in place of its own.
 
     A run or checkpoint gives actor, critic and normalizer. A bundle, which may be of
     another task, gives actor and normalizer: inputs go by the names of their terms, and
@@ -38,7 +38,8 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
     it for the clipped actions to tell one policy from another.
 
     Args:
-        train: untrained networks, or their shapes.
+        train: shapes of the networks (`train_template`), which remain where nothing
+            was learned, or untrained networks.
         env: the batched environment (`envs.batch.BatchEnv`) that they are for.
         path: run directory, checkpoint or bundle.
 
@@ -47,7 +48,7 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
         BundleError: a damaged bundle, or one for another hand.
     """
     if path.suffix != ".onnx" and not (path / POLICY_FILE).is_file():
-        found = warm_started(train, path)
+        found = warm_started(train, read(path))
         fresh, params = train.params.policy["params"], found.params.policy["params"]
         noise = {k: v for k, v in fresh.items() if k not in _LAYERS}
         policy = {**found.params.policy, "params": {**params, **noise}}
@@ -61,6 +62,15 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
     mean, std = (_entries(x, rows, new) for x, new in _statistics(bundle, ours, gain))
     normalizer = _with_statistics(train.normalizer, mean, std)
     return dataclasses.replace(_with_policy(train, policy), normalizer=normalizer)
+
+
+def completed(learned: TrainState, fresh: TrainState) -> TrainState:
+    """Returns `learned` with the leaves of `fresh` where it has shapes only."""
+    return jax.tree.map(
+        lambda ours, other: other if isinstance(ours, jax.ShapeDtypeStruct) else ours,
+        learned,
+        fresh,
+    )
 
 
 def _with_policy(train: TrainState, policy: Any) -> TrainState:

@@ -11,12 +11,17 @@ from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
-from fingers_mjx.policy.interface import interface_of
+from fingers_mjx.policy.interface import identity, interface_of
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.ppo.state import init_train_state, make_learner
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import open_run, record_run
-from fingers_mjx.runs.setup import Setup, config_digest, identity, make_env, new_setup
+from fingers_mjx.runs.setup import (
+    Setup,
+    config_digest,
+    make_env,
+    new_setup,
+)
 from fingers_mjx.training.session import bound
 
 ROOT = Path(__file__).parents[2]
@@ -90,7 +95,7 @@ def forward(weights: PolicyWeights, obs: np.ndarray) -> np.ndarray:
 def make_run(path: Path, setup: Setup) -> Path:
     """Writes a run directory with one checkpoint of untrained networks."""
     env = make_env(setup, setup.train.num_envs, "cpu")
-    shared = bound(env, setup.train, setup.env, identity(env))
+    shared = bound(env, setup, identity(env))
     with open_run(path, resume=False) as run:
         record_run(run, {"train": setup.train, "env": setup.env}, shared, setup.hand)
         learner = make_learner(env, setup.train.ppo)

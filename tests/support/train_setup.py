@@ -14,12 +14,15 @@ from pathlib import Path
 
 from support.probe_envs import probe
 
+from envs.hand.hand_file import load_hand_file
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.metrics import read_metrics
+from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.errors import Interrupted
-from fingers_mjx.training.train import train
+from fingers_mjx.training.train import Start, train
 
+HAND = load_hand_file()
 ROOT = Path(__file__).parents[2]
 os.environ.setdefault("FINGERS_COMPILE_CACHE", str(ROOT / ".jax_cache"))
 
@@ -42,7 +45,7 @@ CONFIG = TrainConfig(
 )
 
 
-def make_env(num_envs):
+def make_env(num_envs=CONFIG.num_envs):
     return probe("seen_action", num_envs, length=3)
 
 
@@ -52,11 +55,15 @@ def config(**changes):
     return dataclasses.replace(CONFIG, ppo=ppo, **changes)
 
 
+def setup(train_config=CONFIG, env=None):
+    return Setup(train_config, env, HAND)
+
+
 def run(path, resume=False, on_progress=lambda event: None, **changes):
     """Trains a probe at `path`; keywords change CONFIG."""
-    return train(
-        make_env, config(**changes), path, resume=resume, on_progress=on_progress
-    )
+    made = config(**changes)
+    env, start = make_env(made.num_envs), Start(resume)
+    return train(env, setup(made), path, start=start, on_progress=on_progress)
 
 
 def leaves(path):

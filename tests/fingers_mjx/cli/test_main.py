@@ -14,8 +14,9 @@ from fingers_mjx.demo.demo import POLICY_DIR
 from fingers_mjx.evaluation.files import read_table
 from fingers_mjx.policy.source import load_source
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.runs.metrics import read_metrics
-from fingers_mjx.training.errors import Diverged, Interrupted, OutOfSpace
+from fingers_mjx.training.errors import Diverged, Interrupted
 
 TINY = [
     "num_envs=4",

@@ -6,8 +6,14 @@ import pytest
 
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
-from fingers_mjx.ppo.config import PRESETS, TrainConfig, bound_fields, paper, preset
-from fingers_mjx.ppo.config_check import check_config
+from fingers_mjx.ppo.config import (
+    PRESETS,
+    TrainConfig,
+    bound_fields,
+    check_config,
+    paper,
+    preset,
+)
 
 
 @pytest.mark.parametrize("name", PRESETS)

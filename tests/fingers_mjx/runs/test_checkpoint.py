@@ -23,8 +23,8 @@ from support import checkpoint_child
 from envs.errors import InputError
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs import files as rundir_files
+from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.runs.tree import to_host
-from fingers_mjx.training.errors import OutOfSpace
 
 POINTS = checkpoint_child.PROTOCOL
 

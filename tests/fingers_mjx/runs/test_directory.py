@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import pytest
 from tensorboardX.proto.event_pb2 import Event
 
+from envs.config.atomic_file import PARTIAL
+from envs.config.typed import load_yaml
 from envs.errors import InputError
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.runs.directory import check_bound, open_run, record_run, saved_config
-from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.directory import check_bound, open_run, record_run
+from fingers_mjx.runs.files import OutOfSpace, write_whole
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
-from fingers_mjx.training.errors import OutOfSpace
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ def events(path):
 
 def test_configuration_comes_back_typed(tmp_path):
     path = make(tmp_path / "run")
-    assert saved_config(path, Run) == Run(**RUN)
+    assert load_yaml(Run, path / "config.yaml") == Run(**RUN)
 
 
 def test_what_is_written_names_nobody_and_is_readable(tmp_path):
@@ -82,9 +83,10 @@ def test_new_run_never_goes_over_something_else(tmp_path, content):
 
 
 def test_new_run_may_take_over_what_died_before_it_began(tmp_path):
-    with open_run(tmp_path / "run", resume=False):
-        pass
-    assert saved_config(make(tmp_path / "run"), Run) == Run(**RUN)
+    with open_run(tmp_path / "run", resume=False) as run:
+        (run / f"{PARTIAL}half-run.json").touch()
+    path = make(tmp_path / "run")
+    assert load_yaml(Run, path / "config.yaml") == Run(**RUN)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,6 @@ nothing grows), T12 (same seed, same run).
 
 import dataclasses
 import resource
-from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -16,17 +15,20 @@ import numpy as np
 import pytest
 from support import train_setup
 from support.probe_envs import Fault, probe
-from support.train_setup import assert_same_end, curve, leaves, make_env, run
+from support.train_setup import assert_same_end, curve, leaves, make_env, run, setup
 
 from envs.errors import InputError
 from envs.settings import HandSettings
 from fingers_mjx.policy.actor import act, load_policy
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.runs.tree import to_host
-from fingers_mjx.training.errors import Diverged, OutOfSpace
+from fingers_mjx.training.errors import Diverged
 from fingers_mjx.training.session import Session
-from fingers_mjx.training.train import train
+from fingers_mjx.training.train import Start, train
 from fingers_mjx.training.warm_start import started_from
+
+RESUME = Start(resume=True)
 
 
 @pytest.fixture(scope="module")
@@ -118,13 +120,13 @@ def test_resume_with_other_settings_is_refused(straight, change, field):
     [
         ({"identity": {"model_sha256": "ab"}}, "identity.model_sha256"),
         ({"identity": {"joint_names": ["b", "a"]}}, "identity.joint_names"),
-        ({"env_config": {"speed": 1.0}}, "env.speed"),
+        ({"env": {"speed": 1.0}}, "env.speed"),
     ],
 )
 def test_resume_with_another_model_is_refused(straight, more, field):
-    config = train_setup.config()
+    settings, identity = setup(env=more.get("env")), more.get("identity")
     with pytest.raises(InputError) as error:
-        train(make_env, config, straight[0], resume=True, **more)
+        train(make_env(), settings, straight[0], start=RESUME, identity=identity)
     assert error.value.field in (field, "env")
 
 
@@ -149,7 +151,8 @@ def test_warm_start_takes_networks_and_normalizer_but_not_the_noise(straight):
 
 def test_warm_started_run_begins_anew(straight, tmp_path):
     path = tmp_path / "run"
-    train(make_env, train_setup.config(iterations=2), path, warm_start=straight[0])
+    settings = setup(train_setup.config(iterations=2))
+    train(make_env(), settings, path, start=Start(warm_start=straight[0]))
     arrays, before = leaves(path)[1], leaves(straight[0])[1]
     assert arrays["train/iteration"] == 2
     assert arrays["train/optimizer/1/count"] == 8
@@ -158,12 +161,18 @@ def test_warm_started_run_begins_anew(straight, tmp_path):
 
 
 def test_warm_start_from_other_networks_is_refused(straight, tmp_path):
-    config = train_setup.config(ppo={"critic_layers": (4,)})
+    settings = setup(train_setup.config(ppo={"critic_layers": (4,)}))
     with pytest.raises(InputError) as error:
-        train(make_env, config, tmp_path / "run", warm_start=straight[0])
+        train(
+            make_env(),
+            settings,
+            tmp_path / "run",
+            start=Start(warm_start=straight[0]),
+        )
+    assert not (tmp_path / "run").exists()
     assert error.value.field == "train/params/value/params/hidden_0/bias"
     with pytest.raises(InputError, match="--warm-start"):
-        train(make_env, config, straight[0], warm_start=straight[0], resume=True)
+        Start(resume=True, warm_start=straight[0])
 
 
 def test_policy_read_back_acts_like_the_network(straight):
@@ -233,9 +242,9 @@ def test_full_disk_of_the_curve_stops_within_one_row(tmp_path):
     assert [row[0] for row in curve(path)] == list(range(1, 11))
 
 
-def overflowing(num_envs, room=48):
-    """A probe that tells of dropped contacts as an environment on Warp does."""
-    env = make_env(num_envs)
+def overflowing(room=48):
+    """A probe that reports dropped contacts as an environment on Warp does."""
+    env = make_env()
 
     def with_metric(state):
         hit = (state.data["clock"] == 5) & state.data["hit"] & (room < 100)
@@ -243,7 +252,7 @@ def overflowing(num_envs, room=48):
         return state.replace(metrics=metrics)
 
     return SimpleNamespace(
-        num_envs=num_envs,
+        num_envs=env.num_envs,
         action_size=env.action_size,
         observation_size=env.observation_size,
         reset=lambda key: with_metric(env.reset(key)),
@@ -256,7 +265,7 @@ def test_dropped_contacts_stop_the_run(tmp_path):
     config = train_setup.config(log_every=10, checkpoint_every=1)
     path, room = tmp_path / "run", HandSettings(contacts_per_world=48)
     with pytest.raises(InputError) as error:
-        train(overflowing, config, path, env_config=room)
+        train(overflowing(), setup(config, room), path)
     told = "iteration 2: contacts dropped in 1 of 16 worlds: env.contacts_per_world: "
     assert str(error.value).startswith(told + "found 48; valid: about 96, or on_over")
     assert leaves(path)[0] == 1
@@ -265,10 +274,8 @@ def test_dropped_contacts_stop_the_run(tmp_path):
     wider = dataclasses.replace(room, contacts_per_world=192)
     other = dataclasses.replace(wider, action_clip=1.0)
     with pytest.raises(InputError, match=r"env\.action_clip: found 1\.0"):
-        train(overflowing, config, path, env_config=other, resume=True)
-    result = train(
-        partial(overflowing, room=192), config, path, env_config=wider, resume=True
-    )
+        train(overflowing(), setup(config, other), path, start=RESUME)
+    result = train(overflowing(192), setup(config, wider), path, start=RESUME)
     assert result.iterations == 10
 
 
@@ -276,7 +283,7 @@ def test_a_run_can_be_told_to_go_on_without_dropped_contacts(tmp_path):
     """T9: it says so after the row of the iteration in which it happened."""
     events, config = [], train_setup.config(on_overflow="warn")
     path, room = tmp_path / "run", HandSettings()
-    train(overflowing, config, path, env_config=room, on_progress=events.append)
+    train(overflowing(), setup(config, room), path, on_progress=events.append)
     kinds = [(e["event"], e.get("iteration")) for e in events]
     notes = [i for i, e in enumerate(events) if "contacts dropped" in str(e)]
     assert [kinds[i - 1] for i in notes] == [("progress", 2)]
@@ -286,15 +293,13 @@ def test_a_run_can_be_told_to_go_on_without_dropped_contacts(tmp_path):
 
 
 def poisoned(fault):
-    return lambda n: probe("seen_action", n, length=3, fault=fault)
+    return probe("seen_action", 16, length=3, fault=fault)
 
 
 def test_fault_of_a_world_is_told_with_its_number(tmp_path):
     events = []
     env = poisoned(Fault("reward", np.nan, world=7, at=5))
-    result = train(
-        env, train_setup.config(), tmp_path / "run", on_progress=events.append
-    )
+    result = train(env, setup(), tmp_path / "run", on_progress=events.append)
     notes = [e["text"] for e in events if e["event"] == "note"]
     assert notes == [
         "iteration 1: reward of world 7 is not finite; the step was set aside"
@@ -308,7 +313,7 @@ def test_divergence_names_term_step_and_state(tmp_path):
     env = poisoned(Fault("reward", 3e38, world=7, at=9, until=10**9))
     config = train_setup.config(ppo={"max_bad_updates": 1})
     with pytest.raises(Diverged) as error:
-        train(env, config, tmp_path / "run")
+        train(env, setup(config), tmp_path / "run")
     diverged = error.value
     assert diverged.exit_code == 3
     assert diverged.iteration == 2
@@ -323,7 +328,7 @@ def test_divergence_names_term_step_and_state(tmp_path):
 
 def test_passing_fault_of_the_update_is_skipped_and_survived(tmp_path):
     env = poisoned(Fault("reward", 3e38, world=7, at=9, until=10))
-    result = train(env, train_setup.config(), tmp_path / "run")
+    result = train(env, setup(), tmp_path / "run")
     assert 0 < result.metrics["updates_skipped"] <= 4
     arrays = leaves(tmp_path / "run")[1]
     learned = [v for k, v in arrays.items() if k.startswith("train/")]

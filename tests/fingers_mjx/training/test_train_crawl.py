@@ -13,9 +13,10 @@ from support.train_setup import assert_same_end, leaves
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.physics.backends import default_backend
+from fingers_mjx.policy.interface import identity
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
-from fingers_mjx.runs.setup import identity, make_env, new_setup
-from fingers_mjx.training.train import train
+from fingers_mjx.runs.setup import make_env, new_setup
+from fingers_mjx.training.train import Start, train
 
 ITERATIONS = 4
 TRAIN = TrainConfig(
@@ -62,15 +63,8 @@ def setup(**changes):
 
 def run(path, env: BatchEnv, settings, iterations=ITERATIONS, **how):
     config = dataclasses.replace(settings.train, iterations=iterations)
-    return train(
-        lambda worlds: env,
-        config,
-        path,
-        env_config=settings.env,
-        hand=settings.hand,
-        identity=identity(env),
-        **how,
-    )
+    settings = dataclasses.replace(settings, train=config)
+    return train(env, settings, path, start=Start(**how), identity=identity(env))
 
 
 @pytest.fixture(scope="module")
