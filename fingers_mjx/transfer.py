@@ -1,4 +1,4 @@
-"""What a found effect is worth: two policies with equal budget in the real hand.
+"""What knowing an effect gains: two policies with equal budget in the real hand.
 
 One is trained on the default hand, one on the hand that identification extended. Both
 then walk in the simulator that carries the effect, in the same worlds.
@@ -16,13 +16,16 @@ import numpy as np
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from fingers_mjx.evaluation.evaluate import EpisodeTable
-from fingers_mjx.evaluation.files import summary_document
 from fingers_mjx.evaluation.measures import steps_alive
-from fingers_mjx.evaluation.source import evaluate_source, nominal, with_command
+from fingers_mjx.evaluation.source import (
+    evaluate_source,
+    nominal,
+    summary,
+    with_command,
+)
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.reports.page import commit_here
 from fingers_mjx.runs.setup import (
     Setup,
     make_env,
@@ -60,7 +63,7 @@ def train_on(
         hand: hand to train on.
         path: new run directory.
         warm: networks to start from; None for fresh ones.
-        say: hears of the progress.
+        say: called with the events of the training.
 
     Raises:
         InputError: settings or a hand with which there is no environment.
@@ -110,7 +113,7 @@ def in_real_hand(
 
 
 def drift(table: EpisodeTable) -> dict[str, np.ndarray]:
-    """Returns what a hand does that was told to walk straight, one value per episode.
+    """Returns the motion of a hand commanded to walk straight, one value per episode.
 
     `drift_deg_s` is the mean turn rate, positive to the left; `sideways_mps` the mean
     speed to the left in V. Both over the steps before a fall.
@@ -153,19 +156,8 @@ def compared(
     if len(names) != 2:
         raise InputError("compared", "sources", len(names), "two policies")
     tables = {name: columns(found[name]) for name in names}
-    policies = {
-        name: summary_document(
-            tables[name],
-            source.setup.train.task,
-            source.name,
-            seed,
-            source.steps_trained,
-            commit_here(),
-        )
-        for name, source in sources.items()
-    }
     return {
-        "policies": policies,
+        "policies": {n: summary(s, tables[n], seed) for n, s in sources.items()},
         "gain": _gains(tables, names),
         "conditions": dict(conditions),
     }

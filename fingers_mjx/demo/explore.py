@@ -11,7 +11,13 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.streams import stream
-from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.evaluation.evaluate import (
+    Episodes,
+    EpisodeTable,
+    Measuring,
+    Progress,
+    evaluate,
+)
 from fingers_mjx.policy.actor import Network, act
 
 
@@ -81,10 +87,8 @@ def explore(
     return evaluate(
         Exploring(env, noise_std),
         lambda obs: act(network, obs["state"]),
-        env.num_envs,
-        steps,
-        jax.random.key(seed),
-        float(env.mj_model.body_mass.sum()),
+        Episodes(env.num_envs, steps, jax.random.key(seed)),
+        Measuring(float(env.mj_model.body_mass.sum())),
         progress,
     )
 

@@ -6,7 +6,7 @@ from functools import partial
 
 import jax
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State, VectorEnv
 from envs.errors import InputError
@@ -40,68 +40,94 @@ class EpisodeTable:
         return jax.tree.map(lambda x: x[:length], one)
 
 
+@dataclass(frozen=True)
+class Episodes:
+    """Which episodes are run.
+
+    Attributes:
+        number: of episodes.
+        steps: longest episode in control steps.
+        key: of the resets; the same key gives the same episodes.
+
+    Raises:
+        InputError: `number` or `steps` is below one.
+    """
+
+    number: int
+    steps: int
+    key: PRNGKeyArray
+
+    def __post_init__(self) -> None:
+        for name, value in (("episodes", self.number), ("steps", self.steps)):
+            if value < 1:
+                raise InputError("evaluate", name, value, "an integer above 0")
+
+
+@dataclass(frozen=True)
+class Measuring:
+    """What the measures of an episode need besides its trace.
+
+    Attributes:
+        mass_kg: of the hand and what it carries, for the cost of transport.
+        task_measures: of one episode, from the fields of its trace by name and the
+            steps that count; added to those that every task has.
+    """
+
+    mass_kg: float = MASS_KG
+    task_measures: TaskMeasures | None = None
+
+
+PAPER = Measuring()
+"""The paper's measures for the paper's hand."""
+
+
 def evaluate(
-    batch_env: VectorEnv,
-    policy_apply: Policy,
-    episodes: int,
-    steps: int,
-    key: Array,
-    mass_kg: float = MASS_KG,
+    env: VectorEnv,
+    policy: Policy,
+    episodes: Episodes,
+    measuring: Measuring = PAPER,
     progress: Progress | None = None,
-    task_measures: TaskMeasures | None = None,
 ) -> EpisodeTable:
     """Runs a policy and measures each episode up to its first `done`.
 
-    Batches are run until there are `episodes`; what a world does after its first `done`
-    is ignored, so it does not matter whether the environment resets itself, as long as
-    the signals of that step are its own (`envs.batch.BatchEnv` keeps them). An episode
-    that is still running after `steps` counts as survived.
+    Batches are run until there are enough episodes; what a world does after its first
+    `done` is ignored, so it does not matter whether the environment resets itself, as
+    long as the signals of that step are its own (`envs.batch.BatchEnv` keeps them). An
+    episode that is still running after the last step counts as survived.
 
     Args:
-        batch_env: the environment; the batch is as large as its `reset` makes it.
-        policy_apply: from batched observations to batched actions, deterministic.
-        episodes: number of episodes.
-        steps: longest episode in control steps.
-        key: of the resets; the same key gives the same episodes.
-        mass_kg: of the hand and what it carries, for the cost of transport.
+        env: the environment; the batch is as large as its `reset` makes it.
+        policy: from batched observations to batched actions, deterministic.
+        episodes: which ones.
+        measuring: what is measured.
         progress: called with (steps done, steps in all) from time to time.
-        task_measures: see `episode_table`.
-
-    Raises:
-        InputError: `episodes` or `steps` is below one.
     """
-    for name, value in (("episodes", episodes), ("steps", steps)):
-        if value < 1:
-            raise InputError("evaluate", name, value, "an integer above 0")
-    advance = jax.jit(partial(_advance, batch_env, policy_apply))
-    rollouts, reset = [], jax.jit(batch_env.reset)
-    while (count := sum(r.done.shape[1] for r in rollouts)) < episodes:
-        state = reset(jax.random.fold_in(key, len(rollouts)))
-        batches = -(-episodes // len(state.done))
-        tell = _telling(progress, count // len(state.done) * steps, batches * steps)
-        rollouts.append(_rollout(advance, state, steps, tell))
-    traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :episodes], *rollouts)
-    return episode_table(traces, float(batch_env.dt), mass_kg, task_measures)
+    number, steps = episodes.number, episodes.steps
+    advance = jax.jit(partial(_advance, env, policy))
+    rollouts, reset = [], jax.jit(env.reset)
+    while (count := sum(r.done.shape[1] for r in rollouts)) < number:
+        state = reset(jax.random.fold_in(episodes.key, len(rollouts)))
+        worlds = len(state.done)
+        report = _reporting(
+            progress, count // worlds * steps, -(-number // worlds) * steps
+        )
+        rollouts.append(_rollout(advance, state, steps, report))
+    traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
+    return episode_table(traces, float(env.dt), measuring)
 
 
-def episode_table(
-    traces: Trace,
-    dt_s: float,
-    mass_kg: float,
-    task_measures: TaskMeasures | None = None,
-) -> EpisodeTable:
+def episode_table(traces: Trace, dt_s: float, measuring: Measuring) -> EpisodeTable:
     """Measures recorded episodes.
 
     Args:
         traces: NumPy arrays, axes time and episode first.
         dt_s: control interval.
-        mass_kg: of the hand and what it carries.
-        task_measures: of one episode, from the fields of its trace by name and the
-            steps that count; added to those that every task has.
+        measuring: what is measured.
     """
-    found = _measures(traces, dt_s, mass_kg)
-    if task_measures is not None:
-        found = found | jax.vmap(partial(_task_measures, task_measures), 1)(traces)
+    found = _measures(traces, dt_s, measuring.mass_kg)
+    if measuring.task_measures is not None:
+        own = partial(_task_measures, measuring.task_measures)
+        found = found | jax.vmap(own, 1)(traces)
     columns = {name: np.asarray(values, float) for name, values in found.items()}
     return EpisodeTable(columns, traces, dt_s)
 
@@ -110,8 +136,8 @@ def _task_measures(measure: TaskMeasures, trace: Trace) -> dict[str, Array]:
     return measure(vars(trace) | trace.extra, steps_alive(trace.done, trace.failed))
 
 
-def _advance(env: VectorEnv, policy_apply: Policy, state: State) -> tuple[State, Trace]:
-    after = env.step(state, policy_apply(state.obs))
+def _advance(env: VectorEnv, policy: Policy, state: State) -> tuple[State, Trace]:
+    after = env.step(state, policy(state.obs))
     return after, record(after)
 
 
@@ -119,7 +145,7 @@ def _rollout(
     advance: Callable[[State], tuple[State, Trace]],
     state: State,
     steps: int,
-    tell: Callable[[int], None],
+    report: Callable[[int], None],
 ) -> Trace:
     taken = []
     for index in range(steps):
@@ -127,16 +153,16 @@ def _rollout(
         taken.append(now)
         if (index + 1) % REPORT_EVERY == 0:
             jax.block_until_ready(now)
-            tell(index + 1)
+            report(index + 1)
     return jax.tree.map(lambda *x: np.stack(x), *jax.device_get(taken))
 
 
-def _telling(progress: Progress | None, before: int, total: int):
-    def tell(done: int) -> None:
+def _reporting(progress: Progress | None, before: int, total: int):
+    def report(done: int) -> None:
         if progress is not None:
             progress(before + done, total)
 
-    return tell
+    return report
 
 
 @partial(jax.jit, static_argnames=("dt_s", "mass_kg"))

@@ -1,10 +1,11 @@
 """The paper's measures of one episode, as pure functions of its time series.
 
 Every function takes the arrays of one episode over control steps t and a mask `alive`
-(1 up to the last step that counts, then 0); callers vmap over episodes. Averages run
-over the steps that count. A measure that an episode does not define, such as the speed
-of an episode without a speed command, is NaN. Where the paper ("Measures" in its
-ablation) leaves a choice open, the docstring says "ours".
+(1 up to the last step that counts, then 0; written m_t); callers vmap over episodes.
+Averages run over the steps that count. A measure that an episode does not define, such
+as the speed of an episode without a speed command, is NaN. The source is the paper
+*Fingers as Legs*, "Measures" in its ablation; where it leaves a choice open, the
+docstring says "ours".
 """
 
 import jax.numpy as jnp
@@ -20,9 +21,12 @@ MIN_CONTACT_FRACTION = 0.05
 def masked_mean(
     values: Float[Array, "T ..."], mask: Bool[Array, "T ..."]
 ) -> Float[Array, "..."]:
-    """Returns Σ_t m_t x_t / Σ_t m_t; NaN where the mask is empty.
+    """Σ_t m_t x_t / Σ_t m_t, in the unit of x [1 for flags]; NaN where no m_t is set.
 
     Values outside the mask may be anything, NaN included.
+
+    Source:
+        Ours: the mean over the steps that count.
     """
     total = jnp.where(mask, values, 0.0).sum(axis=0)
     count = mask.sum(axis=0)
@@ -39,7 +43,8 @@ def task_speed_mps(
     Leaving out the steps of smaller commands, which have no direction, is ours; their
     threshold is the paper's dead band of the lift and direction objectives.
 
-    Source: paper, Measures, "task speed".
+    Source:
+        *Fingers as Legs*, Measures, "task speed".
     """
     planar = command[:, :2]
     speed = jnp.linalg.norm(planar, axis=1)
@@ -51,9 +56,10 @@ def task_speed_mps(
 def contacts(
     tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
 ) -> Bool[Array, "T 5"]:
-    """Tells which fingertips carry at least 0.15 N in which steps that count.
+    """c_ti = (F_ti ≥ F_th) ∧ m_t: which tips carry at least 0.15 N [N] in which steps.
 
-    Source: paper, contact threshold F_th.
+    Source:
+        *Fingers as Legs*, contact threshold F_th.
     """
     return (tip_force_n >= CONTACT_N) & alive[:, None]
 
@@ -61,9 +67,12 @@ def contacts(
 def touchdowns(
     tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
 ) -> Float[Array, "5"]:
-    """Number of rising edges of each tip's contact.
+    """Σ_t c_ti ∧ ¬c_{t-1,i}: number of rising edges of each tip's contact [1].
 
-    A tip that stands at the start has not touched down yet (ours).
+    The force is in [N]. A tip that stands at the start has not touched down yet (ours).
+
+    Source:
+        *Fingers as Legs*, Measures, "touchdown".
     """
     contact = contacts(tip_force_n, alive)
     return (contact[1:] & ~contact[:-1]).sum(axis=0).astype(jnp.float32)
@@ -72,7 +81,11 @@ def touchdowns(
 def contact_fraction(
     contact: Bool[Array, "T 5"], alive: Bool[Array, " T"]
 ) -> Float[Array, "5"]:
-    """Fraction of the episode that each tip is in contact: Σ contact / Σ alive."""
+    """Σ_t m_t c_ti / Σ_t m_t in [0, 1]: fraction of steps with contact of each tip [1].
+
+    Source:
+        *Fingers as Legs*, Measures, "five-finger participation".
+    """
     counted = jnp.broadcast_to(alive[:, None], contact.shape)
     return masked_mean(contact.astype(jnp.float32), counted)
 
@@ -80,12 +93,13 @@ def contact_fraction(
 def five_finger_participation(
     tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
 ) -> Float[Array, ""]:
-    """1 if every fingertip takes part in the gait, else 0.
+    """∧_i (touchdowns_i ≥ 3 ∧ contact fraction_i ≥ 0.05) as 0 or 1 [1].
 
-    Taking part: at least 3 touchdowns and at least 5 % of the episode in contact. The
-    mean over episodes is the fraction that the paper reports.
+    1 if every fingertip takes part in the gait; the force is in [N]. The mean over
+    episodes is the fraction that the paper reports.
 
-    Source: paper, Measures, "five-finger participation".
+    Source:
+        *Fingers as Legs*, Measures, "five-finger participation".
     """
     contact = contacts(tip_force_n, alive)
     return _participation(tip_force_n, contact, alive)
@@ -96,12 +110,13 @@ def non_nail_participation(
     pad_tilt_rad: Float[Array, "T 5"],
     alive: Bool[Array, " T"],
 ) -> Float[Array, ""]:
-    """1 if every fingertip takes part in the gait without counting its nail, else 0.
+    """∧_i (touchdowns_i ≥ 3 ∧ fraction of c_ti ∧ (θ_ti < 64°) ≥ 0.05) as 0 or 1 [1].
 
-    As `five_finger_participation`, but only contact with a tilt below 64° counts
-    towards the 5 % of the episode; all touchdowns count.
+    As `five_finger_participation`, but only contact with a tilt θ [rad] below 64°
+    counts towards the 5 % of the episode; all touchdowns count.
 
-    Source: paper, Measures, "non-nail participation".
+    Source:
+        *Fingers as Legs*, Measures, "non-nail participation".
     """
     contact = contacts(tip_force_n, alive)
     padded = contact & (pad_tilt_rad < NAIL_TILT_RAD)
@@ -113,13 +128,14 @@ def contact_tilt_rad(
     pad_tilt_rad: Float[Array, "T 5"],
     alive: Bool[Array, " T"],
 ) -> Float[Array, "5"]:
-    """Mean tilt of each fingertip while in contact [rad], NaN for a tip never down.
+    """Σ_t c_ti θ_ti / Σ_t c_ti: mean tilt of each tip while in contact [rad].
 
-    The tilt is the elevation of the pad's normal above the horizontal: -π/2 lies flat
-    on the pad, +π/2 stands on the nail. `nanmean` and `nanmax` over tips give the mean
-    and the worst tip.
+    The tilt θ is the elevation of the pad's normal above the horizontal: -π/2 lies flat
+    on the pad, +π/2 stands on the nail; NaN for a tip never down. `nanmean` and
+    `nanmax` over tips give the mean and the worst tip.
 
-    Source: paper, Measures, contact posture.
+    Source:
+        *Fingers as Legs*, Measures, contact posture.
     """
     return masked_mean(pad_tilt_rad, contacts(tip_force_n, alive))
 
@@ -129,12 +145,13 @@ def worst_tip_planting_fraction(
     pad_tilt_rad: Float[Array, "T 5"],
     alive: Bool[Array, " T"],
 ) -> Float[Array, ""]:
-    """Smallest over tips of the fraction of contact time below 64° of tilt, in [0, 1].
+    """min_i Σ_t c_ti (θ_ti < 64°) / Σ_t c_ti in [0, 1], from tilts θ [rad].
 
     The tip with the largest fraction of nail-side contact has the smallest fraction of
-    the other side. Tips never in contact are left out (ours); NaN if none is.
+    the other side. Tips never in contact do not count (ours); NaN if none is.
 
-    Source: paper, Measures, "worst-tip planting fraction".
+    Source:
+        *Fingers as Legs*, Measures, "worst-tip planting fraction".
     """
     below = (pad_tilt_rad < NAIL_TILT_RAD).astype(jnp.float32)
     return jnp.nanmin(masked_mean(below, contacts(tip_force_n, alive)))
@@ -143,9 +160,10 @@ def worst_tip_planting_fraction(
 def undesired_contact_rate(
     undesired: Bool[Array, " T"], alive: Bool[Array, " T"]
 ) -> Float[Array, ""]:
-    """Fraction of steps in which the palm or a link that is no fingertip touches.
+    """Σ_t m_t u_t / Σ_t m_t in [0, 1] [1]; u_t: the palm or a link but a tip touches.
 
-    In [0, 1]; ours.
+    Source:
+        Ours.
     """
     return masked_mean(undesired.astype(jnp.float32), alive)
 
@@ -155,8 +173,11 @@ def energy_j(
 ) -> Float[Array, ""]:
     """Mechanical work of the joints without recuperation [J]: Σ_t P_t Δt.
 
-    P = Σ_i |τ_i ω_i| with torque τ and speed ω of joint i, sampled once per control
-    step. Heat of the motors is not included; ours.
+    P = Σ_i |τ_i ω_i| [W] with torque τ and speed ω of joint i, sampled once per control
+    step. Heat of the motors is not included.
+
+    Source:
+        Ours.
     """
     return jnp.where(alive, power_w, 0.0).sum() * dt_s
 
@@ -174,7 +195,8 @@ def path_speed_mps(
     travel (ours; at the largest turn rate of 0.45 rad/s a chord is 0.8 % shorter than
     its arc). NaN for an episode shorter than the window.
 
-    Source: paper, hardware "mean path speed".
+    Source:
+        *Fingers as Legs*, hardware, "mean path speed".
     """
     lag = min(max(1, round(window_s / dt_s)), len(palm_pos_w) - 1)
     short = alive.sum() * dt_s <= window_s - dt_s / 2
@@ -190,7 +212,12 @@ def cost_of_transport(
     mass_kg: float,
     gravity_mps2: float = 9.81,
 ) -> Float[Array, ""]:
-    """Energy over weight and distance: E / (m g · v · T), without unit; NaN at rest."""
+    """E / (m g v T) [1]: energy over weight and distance; NaN at rest.
+
+    Source:
+        Gabrielli and von Kármán, "What price speed?", Mechanical Engineering, 1950,
+        as specific resistance.
+    """
     distance = path_speed * duration_s
     return jnp.where(
         distance > 0, energy / (mass_kg * gravity_mps2 * distance), jnp.nan
@@ -207,8 +234,11 @@ def turn_rate_error_rad_s(
     """How far the heading rate is from its command [rad/s], at least 0.
 
     mean_t |(1/w) Σ_{s in t..t+w} (ω_s - c_s)|: the error of sliding one-second means,
-    because the yaw rate swings within each stride (ours). NaN for an episode shorter
-    than the window.
+    because the yaw rate swings within each stride. NaN for an episode shorter than the
+    window.
+
+    Source:
+        Ours.
     """
     span = max(1, round(window_s / dt_s))
     error = jnp.where(alive, yaw_rate - command_yaw_rate, 0.0)
@@ -220,9 +250,10 @@ def turn_rate_error_rad_s(
 
 
 def survival(failed: Bool[Array, " T"]) -> Float[Array, ""]:
-    """1 if no step before the time limit ended the episode by failure, else 0.
+    """1 - max_t failed_t ∈ {0, 1} [1]: whether no failure ended the episode early.
 
-    Source: paper, terminations.
+    Source:
+        *Fingers as Legs*, terminations.
     """
     return 1.0 - failed.any().astype(jnp.float32)
 
@@ -230,10 +261,13 @@ def survival(failed: Bool[Array, " T"]) -> Float[Array, ""]:
 def steps_alive(
     done: Bool[Array, " T"], failed: Bool[Array, " T"]
 ) -> Bool[Array, " T"]:
-    """Tells which steps of the first episode count.
+    """m_t = (Σ_{s<t} done_s = 0) ∧ ¬failed_t [1]: which steps of an episode count.
 
     All up to the first `done`. That step itself counts where the time limit ended the
     episode, and not where a failure did: a fallen hand walks no more.
+
+    Source:
+        Ours.
     """
     ended = jnp.cumsum(done.astype(jnp.int32))
     return (ended - done == 0) & ~failed

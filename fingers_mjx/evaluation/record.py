@@ -13,7 +13,7 @@ MASS_KG = 0.818
 
 @flax.struct.dataclass
 class Trace:
-    """The part of the signals that measures and figures read.
+    """The part of the signals that measures and plots read.
 
     Leading axes: none for one step of one hand, T for one episode, T and episodes for a
     whole evaluation.
@@ -32,8 +32,8 @@ class Trace:
         power_w: Σ |torque · joint speed| [W].
         done: the episode ended in this step.
         failed: it ended for another reason than the time limit.
-        overflow: something was dropped for want of room, in the order of
-            `envs.physics.room.ROOM`: contacts, constraints.
+        overflow: contacts or constraints were dropped, in the order of
+            `envs.physics.room.ROOM`.
         extra: the task's own signals by name.
     """
 
@@ -82,15 +82,20 @@ def record(state: State) -> Trace:
 def episode_measures(
     trace: Trace, dt_s: float, mass_kg: float = MASS_KG
 ) -> dict[str, Float[Array, ""]]:
-    """Returns every measure of one episode by name; NaN where undefined.
+    """Returns every measure y = f(x_{t=1..T}) of one episode; NaN where undefined.
 
-    An episode lasts until its first `done` and no step after it counts; for that step
-    itself see `measures.steps_alive`.
+    Units stand at the end of the names: duration [s], energy [J], speed [m/s], turn
+    rate [rad/s], tilt [°]; fractions and counts have none [1]. An episode lasts until
+    its first `done` and no step after it counts; for that step itself see
+    `measures.steps_alive`.
 
     Args:
         trace: one episode, time first.
         dt_s: control interval.
         mass_kg: of the hand and what it carries.
+
+    Source:
+        `fingers_mjx.evaluation.measures`, each with its own.
     """
     alive = measures.steps_alive(trace.done, trace.failed)
     to_the_end = measures.steps_alive(trace.done, jnp.zeros_like(trace.failed))

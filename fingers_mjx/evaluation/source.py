@@ -15,7 +15,13 @@ from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
 from envs.tasks.keyboard.task import KeyboardConfig
 from envs.tasks.keyboard.variation import nominal_keyboard
-from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, evaluate
+from fingers_mjx.evaluation.evaluate import (
+    Episodes,
+    EpisodeTable,
+    Measuring,
+    Progress,
+    evaluate,
+)
 from fingers_mjx.evaluation.files import (
     SUMMARY_FILE,
     TABLE_FILE,
@@ -38,7 +44,7 @@ GAIT_S = 8.0
 def nominal(setup: Setup) -> Setup:
     """Returns `setup` with the nominal hand, and no noise, not at the start either.
 
-    A keyboard is that of the figures, and lies where it should.
+    A keyboard has its nominal parameters, and lies where it should.
     """
     calm = no_randomization(setup.hand.tip_friction.value)
     noise = ("reset_joint_rad", "reset_speed_mps")  # of tasks that start in the stance
@@ -107,10 +113,10 @@ def evaluate_source(
         seed: of worlds, commands and noise.
         backend: physics backend.
         steps: control steps of an episode; as in training if not given.
-        progress: told (steps done, steps in all).
+        progress: called with (steps done, steps in all).
 
     Raises:
-        InputError: settings that do not fit, or too little room for the contacts: what
+        InputError: settings that do not fit, or too little space for the contacts: what
             is measured without some of them is no result.
     """
     setup = source.setup
@@ -123,12 +129,9 @@ def evaluate_source(
     table = evaluate(
         batch,
         lambda obs: act(source.network, obs["state"]),
-        episodes,
-        batch.episode_length,
-        jax.random.key(seed),
-        hand_mass_kg(batch),
+        Episodes(episodes, batch.episode_length, jax.random.key(seed)),
+        measuring(batch),
         progress,
-        batch.task.episode_measures,
     )
     _check_room(table, setup.env)
     return table
@@ -145,9 +148,24 @@ def _check_room(table: EpisodeTable, config: Any) -> None:
             raise too_little_room(source, metric, config, " (with --set)")
 
 
-def hand_mass_kg(batch: BatchEnv) -> float:
-    """Returns the mass of the hand and what it carries, without the task's bodies."""
-    return float(batch.mj_model.body_subtreemass[batch.spec.palm_body])
+def measuring(batch: BatchEnv) -> Measuring:
+    """Returns what is measured in `batch`; the mass is without the task's bodies."""
+    mass_kg = float(batch.mj_model.body_subtreemass[batch.spec.palm_body])
+    return Measuring(mass_kg, batch.task.episode_measures)
+
+
+def summary(
+    source: PolicySource, columns: Mapping[str, np.ndarray], seed: int
+) -> dict[str, Any]:
+    """Returns the summary of a policy's episodes for JSON.
+
+    Args:
+        source: policy.
+        columns: measure name to one value per episode.
+        seed: of the evaluation.
+    """
+    task, steps = source.setup.train.task, source.steps_trained
+    return summary_document(columns, task, source.name, seed, steps, commit_here())
 
 
 def document(
@@ -164,33 +182,26 @@ def document(
         seed: of the evaluation.
         conditions: what else it takes to repeat it, as plain data.
     """
-    about = summary_document(
-        table.columns,
-        source.setup.train.task,
-        source.name,
-        seed,
-        source.steps_trained,
-        commit_here(),
-    )
-    return {**about, "conditions": dict(conditions)}
+    found = summary(source, table.columns, seed)
+    return {**found, "conditions": dict(conditions)}
 
 
 def write_evaluation(
-    directory: Path, table: EpisodeTable, summary: Mapping[str, Any]
+    directory: Path, table: EpisodeTable, about: Mapping[str, Any]
 ) -> None:
-    """Writes summary, table of episodes and figures.
+    """Writes summary, table of episodes and plots.
 
     Args:
-        directory: made if missing; other files in it are left alone.
+        directory: made if missing; other files in it stay.
         table: the episodes.
-        summary: from `document`.
+        about: from `document`.
     """
     directory.mkdir(parents=True, exist_ok=True)
-    about = {k: str(v) for k, v in summary.items() if k != "measures"}
-    write_table(directory / TABLE_FILE, table.columns, about)
+    notes = {k: str(v) for k, v in about.items() if k != "measures"}
+    write_table(directory / TABLE_FILE, table.columns, notes)
     for name, figure in evaluation_figures(table).items():
         figure.savefig(directory / f"{name}.png")
-    write_summary(directory / SUMMARY_FILE, summary)
+    write_summary(directory / SUMMARY_FILE, about)
 
 
 def evaluation_figures(table: EpisodeTable) -> dict[str, Figure]:

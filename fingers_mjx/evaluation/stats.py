@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -38,13 +39,13 @@ class Summary:
 def summarize(
     values: Float[np.ndarray, " n"], confidence: float = 0.95, seed: int = 0
 ) -> Summary:
-    """Summarizes one number per episode or per seed.
+    """x̄ = Σ xᵢ/n, s² = Σ (xᵢ - x̄)²/(n - 1) and the interval of x̄, in the unit of x [1].
 
     NaN marks a measure that an episode does not define (such as the speed of an episode
-    without a speed command); it is left out and `n` counts the rest. The interval is a
-    bias-corrected and accelerated bootstrap (Efron 1987) of the mean. For values that
-    are all 0 or 1 it is Wilson's score interval of a proportion, because resampling 256
-    successes out of 256 says nothing about the failure that was not seen.
+    without a speed command) and does not count. The interval is a bias-corrected and
+    accelerated bootstrap of the mean. For values that are all 0 or 1 it is Wilson's
+    score interval of a proportion, because resampling 256 successes out of 256 says
+    nothing about the failure that was not seen.
 
     Args:
         values: one number per independent unit.
@@ -53,6 +54,10 @@ def summarize(
 
     Raises:
         InputError: a value is infinite.
+
+    Source:
+        Efron, "Better Bootstrap Confidence Intervals", JASA, 1987; Wilson, "Probable
+        Inference, the Law of Succession, and Statistical Inference", JASA, 1927.
     """
     if np.isinf(values).any():
         raise InputError("summarize", "values", "infinity", "finite numbers or NaN")
@@ -66,18 +71,23 @@ def bootstrap_interval(
     values: Float[np.ndarray, " n"],
     confidence: float = 0.95,
     seed: int = 0,
-    statistic: Callable[..., np.ndarray] = np.mean,
+    statistic: Callable[..., Any] = np.mean,
 ) -> tuple[float, float]:
-    """Returns the BCa bootstrap interval of a statistic; NaN below two values.
+    """[θ*(α₁), θ*(α₂)]: the BCa bootstrap interval of a statistic θ, in its unit [1].
 
-    Values that are all equal give an interval of width zero. Where leaving one value
-    out never moves the statistic, BCa is undefined (0/0) and percentiles are returned.
+    α₁, α₂ are the percentiles of θ over resamples, corrected for bias and skewness; NaN
+    below two values. Values that are all equal give an interval of width zero. Where
+    leaving one value out never moves the statistic, BCa is undefined (0/0) and
+    percentiles are returned.
 
     Args:
         values: defined numbers, one per independent unit.
         confidence: coverage of the interval.
         seed: of the resampling.
         statistic: takes an array and an `axis`.
+
+    Source:
+        Efron, "Better Bootstrap Confidence Intervals", JASA, 1987; `scipy.stats`.
     """
     if len(values) < 2:
         return np.nan, np.nan
@@ -102,11 +112,11 @@ def paired_difference(
     confidence: float = 0.95,
     seed: int = 0,
 ) -> Summary:
-    """Summarizes ours - other over seeds that both were trained on.
+    """Summarizes dᵢ = oursᵢ - otherᵢ over seeds i that both were trained on, as x [1].
 
     Seeds, not episodes, are resampled: episodes of one policy are not independent
-    evidence about the training method. A seed that either side does not define is left
-    out.
+    evidence about the training method. A seed that either side does not define
+    does not count.
 
     Args:
         ours: one number per seed.
@@ -116,6 +126,9 @@ def paired_difference(
 
     Raises:
         InputError: the two sides differ in length.
+
+    Source:
+        Ours; the interval is that of `bootstrap_interval`.
     """
     if len(ours) != len(other):
         found, valid = f"{len(other)} seeds", f"{len(ours)} seeds as the first"
@@ -125,15 +138,18 @@ def paired_difference(
     return _summary(difference, bootstrap_interval(difference, confidence, seed))
 
 
-def interquartile_mean(values: Float[np.ndarray, "*b n"], axis: int = -1) -> np.ndarray:
-    """Returns the mean of the middle half of sorted values.
-
-    floor(n / 4) values are cut from each end, as in Agarwal et al. 2021, "Deep
-    Reinforcement Learning at the Edge of the Statistical Precipice".
+def interquartile_mean(
+    values: Float[np.ndarray, "..."], axis: int = -1
+) -> Float[np.ndarray, "..."]:
+    """Σ_{k<i≤n-k} x₍ᵢ₎/(n - 2k), k = ⌊n/4⌋: mean of the middle half [unit of x, 1].
 
     Args:
         values: numbers without NaN.
         axis: the axis of independent units.
+
+    Source:
+        Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical
+        Precipice", NeurIPS, 2021.
     """
     ordered = np.sort(np.moveaxis(np.asarray(values, float), axis, -1), axis=-1)
     cut = ordered.shape[-1] // 4

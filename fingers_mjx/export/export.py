@@ -93,10 +93,13 @@ def export_policy(
 def sample_observations(
     weights: PolicyWeights, seed: int = 0
 ) -> Float[np.ndarray, "B N"]:
-    """Returns 4,096 random observations and 12 extreme ones.
+    """Observations o = μ + σ n, 4,096 random and 12 extreme [unit of each entry, 1].
 
-    Random: mean + std·n with n standard normal. Extreme: zeros, the mean, and corners
-    mean ± r·std with random signs for r = 3 … 100.
+    Random: n standard normal. Extreme: zeros, the mean, and corners n = ±r with random
+    signs for r = 3 … 100.
+
+    Source:
+        Ours.
     """
     rng = np.random.default_rng(seed)
     size = len(weights.mean)

@@ -8,7 +8,7 @@ import numpy as np
 
 from fingers_mjx.evaluation.evaluate import EpisodeTable, Progress, episode_table
 from fingers_mjx.evaluation.record import Trace
-from fingers_mjx.evaluation.source import hand_mass_kg
+from fingers_mjx.evaluation.source import measuring
 from fingers_mjx.play.player import Played, Player, Schedule
 
 
@@ -57,8 +57,7 @@ def play_episodes(
     traces = [_padded(one.trace, steps) for one in played]
     joined = jax.tree.map(lambda *x: np.stack(x, axis=1), *traces)
     env = player.env
-    measures = env.task.episode_measures
-    table = episode_table(joined, env.dt, hand_mass_kg(env), measures)
+    table = episode_table(joined, env.dt, measuring(env))
     return Session(table, played[0], sum(one.held for one in played))
 
 

@@ -80,7 +80,11 @@ def load_policy(path: Path) -> Policy:
 def act(policy: Network, obs: Float[Array, "*b n"]) -> Float[Array, "*b a"]:
     """Returns the mean action, neither clipped nor squashed: the environment does that.
 
-    a = W_k elu(… elu(W_0 (obs - mean)/std + b_0) …) + b_k
+    a = W_k elu(… elu(W_0 (o - μ)/σ + b_0) …) + b_k, with o, μ, σ in the unit of each
+    entry and a without one [1].
+
+    Source:
+        The actor of Brax's PPO, `make_networks` of `fingers_mjx.ppo.brax`.
     """
     hidden = (obs - policy.mean) / policy.std
     for kernel, bias in policy.layers[:-1]:

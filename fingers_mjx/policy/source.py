@@ -45,7 +45,7 @@ class PolicySource:
 
     @property
     def name(self) -> str:
-        """The end of the path: what is written tells nothing of where it lies."""
+        """The end of the path: results do not mention where the policy lies."""
         path = self.path.absolute()
         return f"{path.parent.name}/{path.name}" if path.suffix else path.name
 
@@ -70,7 +70,7 @@ def load_source(path: Path) -> PolicySource:
 
 
 def is_run(path: Path) -> bool:
-    """Tells whether `path` is a run directory, of whichever version."""
+    """Whether `path` is a run directory, of whichever version."""
     return (path / RUN_FILE).is_file()
 
 

@@ -78,7 +78,11 @@ def adapt_learning_rate(
 ) -> optax.OptState:
     """Returns `state` with the rate divided or multiplied by 1.5 as the KL asks.
 
-    Above 2·desired_kl the rate falls, below desired_kl/2 it rises, within its bounds.
+    η ← max(η_min, η/1.5) if D > 2 D*; η ← min(η_max, 1.5 η) if 0 < D < D*/2; else η.
+    D is the mean divergence of an update and D* the desired one [nat], η the rate [1].
+
+    Source:
+        Brax, `optimizer.adaptive_kl_learning_rate`; as in RSL-RL.
     """
     own = jax.tree.map(lambda x: x, state)  # Brax writes into the dict it is given
     adapted, _ = optimizer.adaptive_kl_learning_rate(
@@ -92,7 +96,11 @@ def adapt_learning_rate(
 
 
 def learning_rate(state: optax.OptState) -> Float[Array, ""]:
-    """Returns the current rate of an optimizer made by `make_optimizer`."""
+    """η [1], the current rate of an optimizer made by `make_optimizer`: Δθ = -η·Adam.
+
+    Source:
+        Kingma and Ba, "Adam: A Method for Stochastic Optimization", 2015.
+    """
     return state[-1].hyperparams["learning_rate"]  # pyright: ignore
 
 
@@ -128,7 +136,13 @@ def update_normalizer(
 ) -> RunningStatisticsState:
     """Returns `state` after the rows of `observation` that are `valid`.
 
-    If nothing was valid, or the new statistics would not be finite, the old are kept.
+    n' = n + Σ m; μ' = μ + Σ m (o - μ)/n'; S' = S + Σ m (o - μ)(o - μ'), σ² = S/n, with
+    m the mask [1] and o, μ, σ in the unit of the entry [unit of o, such as rad]. If
+    nothing was valid, or the new statistics would not be finite, the old are kept.
+
+    Source:
+        Welford, "Note on a Method for Calculating Corrected Sums of Squares and
+        Products", Technometrics, 1962; Brax, `running_statistics.update`.
     """
     weights = valid.astype(jnp.float32)
     new = running_statistics.update(state, dict(observation), weights=weights)
@@ -140,7 +154,13 @@ def update_normalizer(
 def sample_action(
     ppo_networks: PPONetworks, logits: Any, key: PRNGKeyArray
 ) -> tuple[Float[Array, "b a"], Float[Array, " b"]]:
-    """Returns an action of the distribution `logits` and its log-probability."""
+    """Action a = μ + σ ε, ε ~ N(0, I), and log π(a) = Σ_j log N(a_j; μ_j, σ_j²) [nat].
+
+    The action has no unit [1]: the environment clips and scales it.
+
+    Source:
+        Brax, `NormalDistribution`.
+    """
     distribution = ppo_networks.parametric_action_distribution
     action = distribution.sample_no_postprocessing(logits, key)
     return action, distribution.log_prob(logits, action)

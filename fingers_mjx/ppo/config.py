@@ -93,8 +93,9 @@ class TrainConfig:
         log_every: iterations between two rows of metrics.
         checkpoint_every: iterations between two checkpoints.
         keep_checkpoints: newest checkpoints kept on disk.
-        on_overflow: what to do when Warp had no room for all contacts and dropped some:
-            "stop" with what to set, or "warn" and go on; see `envs.physics.room`.
+        on_overflow: what to do when Warp had no space for all contacts and dropped some
+            of them: "stop" with what to set, or "warn" and go on; see
+            `envs.physics.room`.
         hang_limit_s: shortest time without progress that counts as a hang [s].
         ppo: settings of the learner.
     """

@@ -21,7 +21,7 @@ class Health:
         first_term: index into `term_names` of the first fault of the latest streak;
             -1 if there was none.
         first_iteration: iteration in which the latest streak began; -1 likewise.
-        fault: index into `ppo_rollout.FAULTS` of the latest step set aside.
+        fault: index into `rollout.FAULTS` of the latest step set aside.
         fault_world: world of that step; -1 if there was none.
         fault_iteration: iteration of that step; -1 likewise.
     """
@@ -57,7 +57,11 @@ def term_names(terms: Mapping[str, Any]) -> list[str]:
 
 
 def finite_terms(terms: Mapping[str, Any]) -> Bool[Array, " k"]:
-    """Tells of each of `term_names(terms)` whether all of it is finite."""
+    """okᵢ = ∧ isfinite(xᵢ) [1]: whether each of `term_names(terms)` is finite.
+
+    Source:
+        Ours: an update is skipped if any of them is not.
+    """
     leaves = [leaf for tree in terms.values() for leaf in jax.tree.leaves(tree)]
     return jnp.stack([jnp.all(jnp.isfinite(leaf)) for leaf in leaves])
 
@@ -65,7 +69,15 @@ def finite_terms(terms: Mapping[str, Any]) -> Bool[Array, " k"]:
 def record(
     health: Health, finite: Bool[Array, " k"], iteration: Int[Array, ""]
 ) -> Health:
-    """Returns `health` after an update whose terms were `finite` or not."""
+    """Returns `health` after an update whose terms were `finite` or not.
+
+    With bad = ¬∧ finiteᵢ: streak ← (streak + 1)·bad, worst ← max(worst, streak),
+    skipped ← skipped + bad [counts of updates, 1]. Where a streak begins, its first
+    term that is not finite and its iteration are kept.
+
+    Source:
+        Ours.
+    """
     bad = ~jnp.all(finite)
     begins = bad & (health.streak == 0)
     streak = jnp.where(bad, health.streak + 1, 0)
@@ -85,7 +97,11 @@ def note_faults(
 ) -> Health:
     """Returns `health` after a rollout with these `faults`; 0 is a sound step.
 
-    Of several, the world with the lowest number is named.
+    world = min {i : max_t faults[t, i] > 0} [1], the lowest of several worlds; its
+    largest fault and the iteration are kept with it.
+
+    Source:
+        Ours.
     """
     worst = jnp.max(faults, axis=0)
     world = jnp.argmax(worst > 0).astype(jnp.int32)

@@ -31,15 +31,7 @@ def make_iteration(env: VectorEnv, learner: Learner) -> Iteration:
         train: TrainState, worlds: State, key: PRNGKeyArray
     ) -> tuple[TrainState, State, PRNGKeyArray, Totals]:
         key, key_unroll, key_update = jax.random.split(key, 3)
-        worlds, rollout, totals = unroll(
-            env,
-            learner.networks,
-            train.params,
-            train.normalizer,
-            worlds,
-            key_unroll,
-            learner.config.unroll_length,
-        )
+        worlds, rollout, totals = unroll(env, learner, train, worlds, key_unroll)
         train, update_totals = improve(learner, train, rollout, key_update)
         return train, worlds, key, totals | update_totals
 
@@ -47,7 +39,7 @@ def make_iteration(env: VectorEnv, learner: Learner) -> Iteration:
 
 
 def repeat_iterations(iteration: Iteration, repeat: int) -> Iteration:
-    """Returns the function that does `iteration` `repeat` times; figures are added."""
+    """Returns the function that does `iteration` `repeat` times; metrics add up."""
 
     def body(carry: tuple, _: None) -> tuple[tuple, Totals]:
         train, worlds, key, totals = iteration(*carry)

@@ -10,12 +10,8 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from envs.base import State, VectorEnv
 from envs.physics.room import ROOM
-from fingers_mjx.ppo.brax import (
-    PPONetworkParams,
-    PPONetworks,
-    RunningStatisticsState,
-    sample_action,
-)
+from fingers_mjx.ppo.brax import sample_action
+from fingers_mjx.ppo.state import Learner, TrainState, fixed_types
 from fingers_mjx.ppo.totals import Totals, count, total
 
 FAULTS = ("nothing", "state", "reward", "observation")
@@ -56,30 +52,34 @@ class Rollout:
 
 def unroll(
     env: VectorEnv,
-    networks: PPONetworks,
-    params: PPONetworkParams,
-    normalizer: RunningStatisticsState,
+    learner: Learner,
+    train: TrainState,
     state: State,
     key: PRNGKeyArray,
-    length: int,
 ) -> tuple[State, Rollout, Totals]:
-    """Returns the worlds after `length` steps, their experience and its figures.
+    """Returns the worlds after `unroll_length` steps, their experience and metrics.
 
-    A step is not valid if the environment says so (`info["invalid"]`), or if its
+    a_t ~ π(· | o_t), s_{t+1} = step(s_t, a_t) in every world.
+
+    A step is not valid if the environment reports it (`info["invalid"]`), or if its
     reward, or the observation before or after it, is not finite. It is then truncated
     with reward zero, which takes it out of loss and normalizer; the other worlds are
     not touched.
     """
+    networks = learner.networks
 
     def act(state: State, key: PRNGKeyArray) -> tuple[State, dict[str, Any]]:
         obs, obs_ok = screen(state.obs)
-        logits = networks.policy_network.apply(normalizer, params.policy, obs)
+        logits = networks.policy_network.apply(
+            train.normalizer, train.params.policy, obs
+        )
         action, log_prob = sample_action(networks, logits, key)
         state = fixed_types(env.step(state, action))
         drawn = {"obs": obs, "action": action, "log_prob": log_prob, "logits": logits}
         return state, {**drawn, "obs_ok": obs_ok, **_outcome(state)}
 
-    state, steps = jax.lax.scan(act, state, jax.random.split(key, length))
+    keys = jax.random.split(key, learner.config.unroll_length)
+    state, steps = jax.lax.scan(act, state, keys)
     last_obs, last_ok = screen(state.obs)
     ok = jnp.concatenate([steps.pop("obs_ok"), last_ok[None]])
     totals = jax.tree.map(lambda x: jnp.sum(x, axis=0), steps.pop("totals"))
@@ -89,28 +89,24 @@ def unroll(
     return state, rollout, totals | rollout_totals(rollout)
 
 
-def fixed_types(tree: Any) -> Any:
-    """Returns `tree` without weak types, for which the next call would recompile."""
-
-    def fix(leaf: Array) -> Array:
-        if jnp.issubdtype(leaf.dtype, jax.dtypes.extended):
-            return leaf
-        return jax.lax.convert_element_type(leaf, leaf.dtype)
-
-    return jax.tree.map(fix, tree)
-
-
 def screen(
     obs: Mapping[str, Float[Array, "b _"]],
 ) -> tuple[dict[str, Float[Array, "b _"]], Bool[Array, " b"]]:
-    """Returns `obs` with zeros in worlds that have a non-finite value, and the rest."""
+    """Returns `obs`, zero in worlds with a non-finite value, and which are finite.
+
+    okᵢ = ∧ isfinite(oᵢ) over all entries of all observations of world i; oᵢ ← 0 [unit
+    of the entry] where not okᵢ [1].
+
+    Source:
+        Ours: zero times the weight 0 is 0; NaN times 0 would still be NaN.
+    """
     rows = [jnp.all(jnp.isfinite(x), axis=-1) for x in obs.values()]
     ok = jnp.all(jnp.stack(rows), axis=0)
     return {k: jnp.where(ok[:, None], x, 0.0) for k, x in obs.items()}, ok
 
 
 def _outcome(state: State) -> dict[str, Any]:
-    """Returns what one step gave: reward, endings, faults and figures."""
+    """Returns what one step gave: reward, endings, faults and metrics."""
     reported, finite = state.info["invalid"] != 0, jnp.isfinite(state.reward)
     return {
         "reward": state.reward,
@@ -145,7 +141,10 @@ def _seal(
 
 
 def rollout_totals(rollout: Rollout) -> Totals:
-    """Returns figures of the whole rollout: invalid steps, endings, noise, entropy."""
+    """Returns metrics of the whole rollout: invalid steps, endings, noise, entropy.
+
+    The entropy of a normal with independent entries is Σ_j (ln σ_j + ½ ln 2πe) [nat].
+    """
     std = rollout.logits[1]
     entropy = jnp.sum(jnp.log(std) + 0.5 * jnp.log(2 * jnp.pi * jnp.e), axis=-1)
     ended = rollout.valid & (rollout.done > 0)

@@ -21,7 +21,6 @@ from fingers_mjx.ppo.brax import (
 )
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.health import Health, healthy
-from fingers_mjx.ppo.rollout import fixed_types
 
 Loss = Callable[..., tuple[Array, dict[str, Array]]]
 
@@ -101,6 +100,17 @@ def train_template(env: VectorEnv, config: PpoConfig) -> TrainState:
     return jax.eval_shape(
         lambda key: init_train_state(learner, env, key), jax.random.key(0)
     )
+
+
+def fixed_types(tree: Any) -> Any:
+    """Returns `tree` without weak types, for which the next call would recompile."""
+
+    def fix(leaf: Array) -> Array:
+        if jnp.issubdtype(leaf.dtype, jax.dtypes.extended):
+            return leaf
+        return jax.lax.convert_element_type(leaf, leaf.dtype)
+
+    return jax.tree.map(fix, tree)
 
 
 def strong(tree: Any) -> Any:

@@ -34,7 +34,7 @@ LOSS_TERMS = {
 def improve(
     learner: Learner, train: TrainState, rollout: Rollout, key: PRNGKeyArray
 ) -> tuple[TrainState, Totals]:
-    """Returns `train` after all updates on `rollout`, and the figures of the updates.
+    """Returns `train` after all updates on `rollout`, and the metrics of the updates.
 
     In each epoch the worlds are shuffled and dealt to the minibatches; a world's
     whole trajectory stays together.
@@ -102,8 +102,12 @@ def _update(
 def minibatch(rollout: Rollout, index: Int[Array, " n"]) -> Transition:
     """Returns the worlds `index` of `rollout` as Brax's loss wants them, worlds first.
 
-    Of the observations after each step the loss reads only the last of a trajectory,
-    and only what the critic sees; no others are kept.
+    x[i, t] = rollout.x[t, indexᵢ]; the discount is 1 - done [1]. Of the observations
+    after each step the loss reads only the last of a trajectory, and only what the
+    critic sees; no others are kept.
+
+    Source:
+        `compute_ppo_loss` of `brax.training.agents.ppo.losses`.
     """
 
     def take(steps: Array) -> Array:
@@ -131,7 +135,7 @@ def minibatch(rollout: Rollout, index: Int[Array, " n"]) -> Transition:
 def _update_totals(
     terms: dict[str, Array], gradient: Any, ok: Array, rate: Array
 ) -> Totals:
-    """Returns the figures of one update; the terms of a skipped one do not count."""
+    """Returns the metrics of one update; the terms of a skipped one do not count."""
     totals = {name: total(terms[k], ok) for k, name in LOSS_TERMS.items()}
     totals["grad_norm"] = total(optax.tree.norm(gradient), ok)
     totals["learning_rate"] = total(rate)

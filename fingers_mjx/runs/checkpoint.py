@@ -18,8 +18,8 @@ import orbax.checkpoint as ocp
 
 from envs.config.atomic_file import sync
 from envs.errors import InputError
-from fingers_mjx.runs import seal as manifest
 from fingers_mjx.runs.files import OutOfSpace, room_for
+from fingers_mjx.runs.seal import problem, seal
 from fingers_mjx.runs.tree import (
     check_layout,
     describe,
@@ -72,7 +72,6 @@ def save(
     state: Any,
     meta: Mapping[str, Any],
     keep: int,
-    reached: Callable[[str], None] = lambda point: None,
 ) -> Path:
     """Writes a checkpoint and returns its path; then deletes all but the `keep` newest.
 
@@ -82,29 +81,35 @@ def save(
         state: pytree of arrays; typed random keys are kept as such.
         meta: JSON-able notes (configuration, versions).
         keep: number of checkpoints kept.
-        reached: told each named point of the protocol (for tests of sudden death).
 
     Raises:
         OutOfSpace: if the disk is full; earlier checkpoints are intact.
     """
-    reached("begin")
     arrays, final = to_host(state), directory / f"{iteration:08d}"
     needed = sum(a.nbytes for a in arrays.values()) + _MARGIN_BYTES
     notes = {**meta, "iteration": iteration, "leaves": describe(state)}
     tmp = directory / f"{_TMP}{iteration:08d}"
     try:
         with room_for(final, needed):
-            _write(tmp, arrays, notes, iteration, reached)
-            _commit(tmp, final, reached)
+            _make(tmp)
+            _write_state(tmp, arrays, notes)
+            _write_notes(tmp, notes)
+            seal(tmp, iteration)
+            _free(final)
+            _rename(tmp, final)
+            sync(directory)
     except OutOfSpace:
         shutil.rmtree(tmp, ignore_errors=True)
         raise
-    _retire(directory, keep, reached)
+    for path in checkpoints(directory)[:-keep]:
+        _hide(path)
+    for hidden in directory.glob(f"{_OLD}*"):
+        _delete(hidden)
     return final
 
 
 def clean(directory: Path) -> None:
-    """Removes what a killed process left behind half written or half deleted."""
+    """Removes what a killed process had half written or half deleted."""
     for path in directory.glob(".*"):
         if path.name.startswith((_TMP, _OLD)):
             shutil.rmtree(path)
@@ -120,14 +125,14 @@ def newest(directory: Path, say: Callable[[str], None]) -> Path | None:
 
     Args:
         directory: of all checkpoints of the run.
-        say: told one sentence for each checkpoint that is passed over.
+        say: called with one sentence for each checkpoint that is passed over.
 
     Raises:
         InputError: if there are checkpoints, but none is intact.
     """
     found = checkpoints(directory)
     for path in reversed(found):
-        fault = manifest.problem(path, int(path.name))
+        fault = problem(path, int(path.name))
         if not fault:
             return path
         say(f"checkpoint {path} is damaged ({fault}); trying the one before it")
@@ -154,7 +159,7 @@ def load(path: Path) -> Saved:
     if not (path.name.isdigit() and path.is_dir()):
         found = "another name or no directory"
         raise InputError(path, "", found, "a checkpoint, checkpoints/NNNNNNNN")
-    fault = manifest.problem(path, int(path.name))
+    fault = problem(path, int(path.name))
     if fault:
         raise InputError(path, "", fault, "a complete checkpoint")
     meta = json.loads((path / "meta.json").read_text(encoding="utf-8"))
@@ -164,28 +169,26 @@ def load(path: Path) -> Saved:
     return Saved(path, {**stored, **empty}, meta)
 
 
-def _write(
-    tmp: Path,
-    arrays: Mapping[str, np.ndarray],
-    notes: dict[str, Any],
-    iteration: int,
-    reached: Callable[[str], None],
-) -> None:
-    """Writes everything of a checkpoint under its temporary name."""
+def _make(tmp: Path) -> None:
+    """Makes the directory that will become the checkpoint, empty."""
     shutil.rmtree(tmp, ignore_errors=True)
     tmp.mkdir(parents=True)
-    reached("made")
+
+
+def _write_state(
+    tmp: Path, arrays: Mapping[str, np.ndarray], notes: dict[str, Any]
+) -> None:
+    """Writes the arrays; those without entries, which Orbax refuses, go to `notes`."""
     stored = {name: array for name, array in arrays.items() if array.size}
     notes["empty"] = {k: a.shape for k, a in arrays.items() if not a.size}
     with ocp.PyTreeCheckpointer() as writer:
         writer.save((tmp / "state").absolute(), stored)
     _forget_place(tmp / "state" / "commit_success.txt")
-    reached("state written")
+
+
+def _write_notes(tmp: Path, notes: Mapping[str, Any]) -> None:
     text = json.dumps(notes, indent=1) + "\n"
     (tmp / "meta.json").write_text(text, encoding="utf-8")
-    reached("meta written")
-    manifest.seal(tmp, iteration)
-    reached("sealed")
 
 
 def _forget_place(marker: Path) -> None:
@@ -194,23 +197,20 @@ def _forget_place(marker: Path) -> None:
         marker.write_text("complete\n", encoding="utf-8")
 
 
-def _commit(tmp: Path, final: Path, reached: Callable[[str], None]) -> None:
-    """Gives the complete checkpoint its name, in place of an older one of that name."""
+def _free(final: Path) -> None:
+    """Hides an older checkpoint of the same iteration."""
     if final.exists():
         final.rename(final.with_name(f"{_OLD}{final.name}"))
-    reached("name free")
-    tmp.rename(final)
-    reached("renamed")
-    sync(final.parent)
-    reached("committed")
 
 
-def _retire(directory: Path, keep: int, reached: Callable[[str], None]) -> None:
-    """Deletes all but the newest `keep` checkpoints, each hidden before it goes."""
-    for path in checkpoints(directory)[:-keep]:
-        hidden = path.with_name(f"{_OLD}{path.name}")
-        path.rename(hidden)
-        reached("hidden")
-    for hidden in directory.glob(f"{_OLD}*"):
-        shutil.rmtree(hidden)
-        reached("deleted")
+def _hide(path: Path) -> None:
+    """Takes a checkpoint out of sight in one step, before it is deleted."""
+    path.rename(path.with_name(f"{_OLD}{path.name}"))
+
+
+def _delete(hidden: Path) -> None:
+    shutil.rmtree(hidden)
+
+
+def _rename(path: Path, to: Path) -> None:
+    path.rename(to)

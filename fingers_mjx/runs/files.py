@@ -13,7 +13,7 @@ FULL = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG}
 
 
 class OutOfSpace(OSError):
-    """The disk has no room for what should be written (status 4).
+    """The disk has no space for what should be written (status 4).
 
     Args:
         path: what was being written.
@@ -53,7 +53,7 @@ def room_for(path: Path, needed: int) -> Iterator[None]:
 
 
 def is_full(error: BaseException) -> bool:
-    """Tells whether `error` means a full disk, a quota or a limit of file size.
+    """Whether `error` means a full disk, a quota or a limit of file size.
 
     Orbax reports what its C++ layer met as text only.
     """

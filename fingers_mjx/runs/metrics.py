@@ -4,7 +4,6 @@ import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 from tensorboardX.proto.event_pb2 import Event  # pyright: ignore
@@ -58,12 +57,7 @@ class MetricsLog:
     def __enter__(self) -> "MetricsLog":
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._events.close()
 
     def _write_event(self, event: Event) -> None:
@@ -85,7 +79,7 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
 
 
 def _line(row: Row) -> str:
-    """Returns `row` as one line of JSON; figures that are not finite become null."""
+    """Returns `row` as one line of JSON; numbers that are not finite become null."""
     return json.dumps({k: _number(v) for k, v in row.items()}) + "\n"
 
 
@@ -95,7 +89,7 @@ def _number(value: Any) -> Any:
 
 
 def _event(row: Row) -> Event:
-    """Returns the figures of `row` as one TensorBoard event."""
+    """Returns the numbers of `row` as one TensorBoard event."""
     numbers = {k: v for k, v in row.items() if isinstance(v, int | float)}
     values = [
         Summary.Value(tag=name, simple_value=float(value))

@@ -18,7 +18,7 @@ def leaf_names(tree: Any) -> list[str]:
 
 
 def to_host(tree: Any) -> dict[str, np.ndarray]:
-    """Returns the leaves of `tree` by name; typed random keys as their raw words."""
+    """Returns the leaves of `tree` by name; typed random keys as their raw data."""
     raw = [_raw_key(leaf) for leaf in jax.tree.leaves(tree)]
     values = jax.device_get(raw)
     pairs = zip(leaf_names(tree), values, strict=True)
@@ -53,13 +53,13 @@ def from_host(template: Any, arrays: Mapping[str, np.ndarray]) -> Any:
 
 
 def _is_key(leaf: Any) -> bool:
-    """Tells whether `leaf` is an array of typed random keys."""
+    """Whether `leaf` is an array of typed random keys."""
     dtype = getattr(leaf, "dtype", None)
     return dtype is not None and jnp.issubdtype(dtype, jax.dtypes.prng_key)
 
 
 def _raw_key(leaf: Any) -> Any:
-    """Returns the words of a typed random key, and anything else as it is."""
+    """Returns the raw data of a typed random key, and anything else as it is."""
     return jax.random.key_data(leaf) if _is_key(leaf) else leaf
 
 

@@ -16,8 +16,8 @@ WORLDS = 16
 def dump_state(path: Path, carry: Carry) -> Path:
     """Writes networks, normalizer and the worst worlds to `path` (npz) and returns it.
 
-    Arrays are named by their place in the state; "worlds/index" tells which worlds
-    were kept: those with non-finite values first. Adam's moments are left out, and
+    Arrays are named by their place in the state; "worlds/index" holds which worlds
+    were kept: those with non-finite values first. Adam's moments are omitted, and
     worlds as far as the file would pass 50 MB.
     """
     train = carry.train
@@ -26,8 +26,8 @@ def dump_state(path: Path, carry: Carry) -> Path:
     worlds = to_host(carry.worlds)
     batch = carry.worlds.done.shape[0]
     rows = {k: v for k, v in worlds.items() if v.ndim and v.shape[0] == batch}
-    room = LIMIT_BYTES - sum(a.nbytes for a in arrays.values()) - 2**20
-    number = max(0, min(WORLDS, room * batch // sum(a.nbytes for a in rows.values())))
+    free = LIMIT_BYTES - sum(a.nbytes for a in arrays.values()) - 2**20
+    number = max(0, min(WORLDS, free * batch // sum(a.nbytes for a in rows.values())))
     index = worst_worlds(rows, batch)[:number]
     arrays |= {f"worlds/{k}": v[index] for k, v in rows.items()}
     buffer = io.BytesIO()

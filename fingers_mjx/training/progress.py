@@ -13,7 +13,6 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from types import TracebackType
 from typing import Any, TextIO
 
 from rich.console import Console
@@ -62,10 +61,10 @@ def _json_lines(stream: TextIO) -> OnProgress:
 
 
 class Ticker:
-    """Reports "compiling" with the time elapsed, until it is told that that is over.
+    """Reports "compiling" with the time elapsed, until it is stopped.
 
     Args:
-        on_progress: told the events, from a thread of its own.
+        on_progress: called with the events, from a thread of its own.
         period_s: time between two events [s].
     """
 
@@ -79,12 +78,7 @@ class Ticker:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self.stop()
 
     def stop(self) -> None:

@@ -1,4 +1,4 @@
-"""What the terminal shows of a run: a bar, the figures and the reward terms."""
+"""What the terminal shows of a run: a bar, the metrics and the reward terms."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,7 +7,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-_FIGURES = {
+_METRICS = {
     "episode/return": "return",
     "episode/length": "episode length",
     "task_speed_mps": "task speed [m/s]",
@@ -45,25 +45,25 @@ class Board:
         """Returns the picture of the run as it stands."""
         if not self._row:
             return Text(f"compiling… {self._compiling_s:.0f} s")
-        return Group(self._headline(), self._figures())
+        return Group(self._headline(), self._metrics())
 
     def _headline(self) -> Text:
-        """Returns steps, speed and the time left."""
+        """Returns steps, speed and the remaining time."""
         row = self._row
         share = row["iteration"] / row["iterations"]
         bar = "━" * round(24 * share) + "╌" * (24 - round(24 * share))
         speed = row.get("steps_per_s")
         rate = f"{speed:,.0f} steps/s" if speed else "…"
-        left = f"ETA {clock(row['eta_s'])}" if "eta_s" in row else ""
+        eta = f"ETA {clock(row['eta_s'])}" if "eta_s" in row else ""
         done = f"{row['iteration']}/{row['iterations']}"
-        return Text(f"{bar} {done}  {row['env_steps']:,} steps  {rate}  {left}")
+        return Text(f"{bar} {done}  {row['env_steps']:,} steps  {rate}  {eta}")
 
-    def _figures(self) -> Table:
-        """Returns the figures on the left and the reward terms on the right."""
+    def _metrics(self) -> Table:
+        """Returns two columns: metrics and reward terms."""
         row, table = self._row, Table.grid(padding=(0, 3))
-        left = [(t, figure(row[k])) for k, t in _FIGURES.items() if k in row]
+        left = [(t, shown(row[k])) for k, t in _METRICS.items() if k in row]
         names = sorted(k for k in row if k.startswith("reward/"))
-        right = [(k, figure(row[k])) for k in names]
+        right = [(k, shown(row[k])) for k in names]
         for index in range(max(len(left), len(right))):
             cells = [*_pair(left, index), *_pair(right, index)]
             table.add_row(*cells)
@@ -77,7 +77,7 @@ def clock(seconds: float) -> str:
     return f"{hour}:{minute:02d}:{second:02d}"
 
 
-def figure(value: float) -> str:
+def shown(value: float) -> str:
     """Returns a number in four significant digits."""
     return f"{value:.4g}"
 

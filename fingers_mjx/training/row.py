@@ -1,4 +1,4 @@
-"""One row of the learning curve, from figures gathered on the device.
+"""One row of the learning curve, from metrics gathered on the device.
 
     iteration, iterations   done and in all
     env_steps               control steps of all worlds, since the start of the run
@@ -17,8 +17,8 @@
     invalid                 steps that were set aside as not finite
     updates_skipped         updates skipped as not finite, since the start of the run
 
-A figure without any sample, such as the return before an episode has ended, is left
-out. Other counts are per iteration.
+A metric without any sample, such as the return before an episode has ended, is
+omitted. Other counts are per iteration.
 """
 
 from dataclasses import dataclass, field
@@ -33,10 +33,10 @@ from fingers_mjx.ppo.totals import means
 
 @dataclass
 class Window:
-    """Figures of the iterations since the last row.
+    """Metrics of the iterations since the last row.
 
     Attributes:
-        sums: sum and weight of each figure, per call; still on the device.
+        sums: sum and weight of each metric, per call; still on the device.
         timed_s: time of the calls in which nothing was compiled [s].
         timed_iterations: iterations of those calls.
     """
@@ -57,7 +57,7 @@ class Window:
 
 
 def speed(window: Window, config: TrainConfig, iteration: int) -> dict[str, float]:
-    """Returns steps per second and the time left; nothing before a timed call."""
+    """Returns steps per second and the remaining time; nothing before a timed call."""
     if not window.timed_iterations:
         return {}
     iteration_s = window.timed_s / window.timed_iterations

@@ -42,7 +42,7 @@ class Report:
     """What a call leaves on the device for the host to fetch when it wants to.
 
     Attributes:
-        sums: sum and weight of each figure.
+        sums: sum and weight of each metric.
         health: the fields `HEALTH`.
     """
 
@@ -50,7 +50,7 @@ class Report:
     health: Array
 
     def fetch_sums(self) -> Float[np.ndarray, "k 2"]:
-        """Waits for the call and returns sum and weight of each figure."""
+        """Waits for the call and returns sum and weight of each metric."""
         return np.asarray(self.sums)
 
     def fetch_health(self) -> dict[str, int]:
@@ -66,7 +66,7 @@ class Session:
         config: of the run.
 
     Attributes:
-        names: of the figures, in the order of `Report.sums`.
+        names: of the metrics, in the order of `Report.sums`.
         terms: names that `Health.first_term` points into.
     """
 
@@ -133,16 +133,16 @@ def _parts(carry: Carry) -> tuple[TrainState, State, PRNGKeyArray]:
 
 
 def _reporting(iteration: Iteration) -> Callable[..., tuple]:
-    """Returns `iteration` with its figures and health packed into two arrays."""
+    """Returns `iteration` with its metrics and health packed into two arrays."""
 
     def call(train: TrainState, worlds: State, key: PRNGKeyArray) -> tuple:
         train, worlds, key, totals = iteration(train, worlds, key)
         health = jnp.stack([getattr(train.health, name) for name in HEALTH])
-        return train, worlds, key, pack(totals), health
+        return train, worlds, key, _pack(totals), health
 
     return call
 
 
-def pack(totals: Totals) -> Array:
-    """Returns the figures as one array, in the order of their names."""
+def _pack(totals: Totals) -> Float[Array, "k 2"]:
+    """Returns the totals as one array, in the order of their names."""
     return jnp.stack([totals[name] for name in sorted(totals)])

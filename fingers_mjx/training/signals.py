@@ -4,19 +4,18 @@ import os
 import signal
 import threading
 from collections.abc import Callable
-from types import TracebackType
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
 
 class StopSignals:
-    """Watches for signals while in use; `requested` tells whether one has come.
+    """Watches for signals while in use; `requested` is whether one has come.
 
     The bytes of Python's wakeup descriptor are read by a thread, so that a signal
     counts at once even while the main thread waits inside compiled code.
 
     Args:
-        say: told one sentence when the first signal comes.
+        say: called with one sentence when the first signal comes.
     """
 
     def __init__(self, say: Callable[[str], None]):
@@ -39,12 +38,7 @@ class StopSignals:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         signal.set_wakeup_fd(self._old_fd)
         for number, handler in self._old.items():
             signal.signal(number, handler)

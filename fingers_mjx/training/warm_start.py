@@ -20,7 +20,7 @@ from fingers_mjx.ppo.brax import PPONetworkParams
 from fingers_mjx.ppo.state import TrainState
 
 COUNT = 200_000
-"""Observations that a bundle's normalizer counts as: new terms must soon be heard."""
+"""Observations that a bundle's normalizer counts as: new terms must soon count."""
 NEW_STD = 0.1
 """Standard deviation of inputs that the bundle did not have, until they are seen."""
 
@@ -35,7 +35,7 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
     another task, gives actor and normalizer: inputs go by the names of their terms, and
     those that the bundle did not have begin without influence. The action noise is that
     of the untrained `train`: at the end of a long training there is often too much of
-    it for the clipped actions to tell one policy from another.
+    it for the clipped actions to distinguish one policy from another.
 
     Args:
         train: shapes of the networks (`train_template`), which remain where nothing

@@ -7,7 +7,6 @@ import sys
 import threading
 import time
 from pathlib import Path
-from types import TracebackType
 
 EXIT_CODE = 75
 FIRST_LIMIT_S = 3600.0
@@ -42,17 +41,12 @@ class Watchdog:
         self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *_: object) -> None:
         self._done.set()
         self._thread.join()
 
     def beat(self) -> None:
-        """Tells the watchdog that the run goes on."""
+        """Marks that the run advances."""
         now_s = time.monotonic()
         self._times_s = [*self._times_s[-99:], now_s - self._last_s]
         self._last_s = now_s

@@ -10,28 +10,53 @@ import shutil
 import signal
 import sys
 import threading
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 
 from fingers_mjx.runs import checkpoint
 
-PROTOCOL = (
-    "begin",
-    "made",
-    "state written",
-    "meta written",
-    "sealed",
-    "name free",
-    "renamed",
-    "committed",
-    "hidden",
-    "deleted",
-)
+STEPS = {
+    "begin": "to_host",
+    "made": "_make",
+    "state written": "_write_state",
+    "meta written": "_write_notes",
+    "sealed": "seal",
+    "name free": "_free",
+    "renamed": "_rename",
+    "committed": "sync",
+    "hidden": "_hide",
+    "deleted": "_delete",
+}
+"""Points of the protocol, and the step of `checkpoint.save` that each comes after."""
+PROTOCOL = tuple(STEPS)
 FILES = {"amid the arrays": "state*/**/*", "amid the manifest": "manifest.json"}
 """Points between those of the protocol: as soon as such a file is there."""
 POINTS = (*PROTOCOL, *FILES)
 MISSED, TRIALS = 3, 50
+
+
+@contextmanager
+def watched_steps(reached):
+    """Calls `reached` with the name of each point as a save gets there."""
+
+    def followed(step, point):
+        def call(*args):
+            result = step(*args)
+            reached(point)
+            return result
+
+        return call
+
+    plain = {name: getattr(checkpoint, name) for name in STEPS.values()}
+    for point, name in STEPS.items():
+        setattr(checkpoint, name, followed(plain[name], point))
+    try:
+        yield
+    finally:
+        for name, step in plain.items():
+            setattr(checkpoint, name, step)
 
 
 def state(number):
@@ -58,9 +83,8 @@ def save_and_die(directory, point):
         watched = (directory, FILES[point], over)
         threading.Thread(target=kill_when, args=watched).start()
     at = {point: kill}
-    checkpoint.save(
-        directory, 3, state(3), {}, 2, lambda reached: at.get(reached, bool)()
-    )
+    with watched_steps(lambda reached: at.get(reached, bool)()):
+        checkpoint.save(directory, 3, state(3), {}, 2)
     over.set()
 
 

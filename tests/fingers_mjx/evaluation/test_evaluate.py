@@ -9,7 +9,7 @@ import pytest
 from envs.base import State
 from envs.errors import InputError
 from envs.signals import Signals
-from fingers_mjx.evaluation.evaluate import evaluate
+from fingers_mjx.evaluation.evaluate import Episodes, Measuring, evaluate
 from fingers_mjx.evaluation.files import summary_document
 from fingers_mjx.evaluation.record import record
 
@@ -90,7 +90,8 @@ def constant_speed(obs):
 def run(auto_reset=False, episodes=3, steps=100, falls_at=(0, 40, 0), policy=None):
     env = GlidingHands(falls_at, auto_reset)
     policy = policy or constant_speed
-    return evaluate(env, policy, episodes, steps, jax.random.key(5), mass_kg=1.0)
+    wanted = Episodes(episodes, steps, jax.random.key(5))
+    return evaluate(env, policy, wanted, Measuring(mass_kg=1.0))
 
 
 def test_measures_of_a_gliding_hand_are_known():
@@ -132,7 +133,7 @@ def test_worlds_that_blow_up_spoil_nothing():
         return action.at[1].set(jnp.nan)
 
     env = GlidingHands((0, 1, 0), auto_reset=False)
-    table = evaluate(env, exploding, 3, 100, jax.random.key(0))
+    table = evaluate(env, exploding, Episodes(3, 100, jax.random.key(0)))
     assert np.isnan(table.traces.vel_v[:, 1]).any()
     assert table.columns["survival"][1] == 0
     assert np.isnan(table.columns["task_speed_mps"][1])
@@ -148,9 +149,8 @@ def test_batches_are_run_until_there_are_enough_episodes():
 
     told = []
     env = GlidingHands((0, 0, 0), auto_reset=True)
-    table = evaluate(
-        env, own_speed, 7, 100, jax.random.key(1), progress=lambda *a: told.append(a)
-    )
+    wanted = Episodes(7, 100, jax.random.key(1))
+    table = evaluate(env, own_speed, wanted, progress=lambda *a: told.append(a))
     speeds = table.columns["task_speed_mps"]
     assert speeds.shape == (7,)
     assert len(np.unique(speeds)) == 7, "batches must not repeat each other"
@@ -162,8 +162,8 @@ def test_the_key_decides_the_episodes():
     env = GlidingHands((0, 0, 0), auto_reset=True)
 
     def speeds(seed):
-        key = jax.random.key(seed)
-        table = evaluate(env, lambda obs: obs["state"], 3, 4, key)
+        wanted = Episodes(3, 4, jax.random.key(seed))
+        table = evaluate(env, lambda obs: obs["state"], wanted)
         return table.columns["task_speed_mps"]
 
     np.testing.assert_array_equal(speeds(1), speeds(1))

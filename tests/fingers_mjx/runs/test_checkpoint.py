@@ -46,9 +46,10 @@ def state(number=0):
     }
 
 
-def save(directory, number, keep=3, **kwargs):
+def save(directory, number, keep=3, reached=lambda point: None):
     meta = {"note": number}
-    return checkpoint.save(directory, number, state(number), meta, keep, **kwargs)
+    with checkpoint_child.watched_steps(reached):
+        return checkpoint.save(directory, number, state(number), meta, keep)
 
 
 def assert_equal(one, other):

@@ -14,6 +14,7 @@ import jax
 import numpy as np
 import pytest
 from support import train_setup
+from support.checkpoint_child import watched_steps
 from support.probe_envs import Fault, probe
 from support.train_setup import assert_same_end, curve, leaves, make_env, run, setup
 
@@ -210,7 +211,8 @@ def test_full_disk_stops_and_keeps_what_was_saved(tmp_path, monkeypatch):
             if iteration == 6 and point == "sealed":
                 raise OSError(28, "No space left on device")
 
-        return real(directory, iteration, *args, reached=fill)
+        with watched_steps(fill):
+            return real(directory, iteration, *args)
 
     monkeypatch.setattr(checkpoint, "save", save)
     with pytest.raises(OutOfSpace, match="00000006"):
