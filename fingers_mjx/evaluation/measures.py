@@ -72,7 +72,7 @@ def touchdowns(
     The force is in [N]. A tip that stands at the start has not touched down yet (ours).
 
     Source:
-        *Fingers as Legs*, Measures, "touchdown".
+        Ours: what `five_finger_participation` counts.
     """
     contact = contacts(tip_force_n, alive)
     return (contact[1:] & ~contact[:-1]).sum(axis=0).astype(jnp.float32)
@@ -84,7 +84,7 @@ def contact_fraction(
     """Σ_t m_t c_ti / Σ_t m_t in [0, 1]: fraction of steps with contact of each tip [1].
 
     Source:
-        *Fingers as Legs*, Measures, "five-finger participation".
+        Ours: what `five_finger_participation` counts.
     """
     counted = jnp.broadcast_to(alive[:, None], contact.shape)
     return masked_mean(contact.astype(jnp.float32), counted)
@@ -173,8 +173,8 @@ def energy_j(
 ) -> Float[Array, ""]:
     """Mechanical work of the joints without recuperation [J]: Σ_t P_t Δt.
 
-    P = Σ_i |τ_i ω_i| [W] with torque τ and speed ω of joint i, sampled once per control
-    step. Heat of the motors is not included.
+    P = Σ_i |τ_i ω_i| [W] with torque τ [N·m] and speed ω [rad/s] of joint i, sampled
+    once per control step. Heat of the motors is not included.
 
     Source:
         Ours.
@@ -212,7 +212,7 @@ def cost_of_transport(
     mass_kg: float,
     gravity_mps2: float = 9.81,
 ) -> Float[Array, ""]:
-    """E / (m g v T) [1]: energy over weight and distance; NaN at rest.
+    """COT = E / (m g v T) [1]: energy over weight and distance; NaN at rest.
 
     Source:
         Gabrielli and von Kármán, "What price speed?", Mechanical Engineering, 1950,

@@ -1,8 +1,6 @@
 """Statistics of evaluations: intervals over episodes, paired differences over seeds."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -71,20 +69,18 @@ def bootstrap_interval(
     values: Float[np.ndarray, " n"],
     confidence: float = 0.95,
     seed: int = 0,
-    statistic: Callable[..., Any] = np.mean,
 ) -> tuple[float, float]:
-    """[θ*(α₁), θ*(α₂)]: the BCa bootstrap interval of a statistic θ, in its unit [1].
+    """Low, high = θ*(α₁), θ*(α₂): BCa bootstrap interval of the mean θ [its unit, 1].
 
     α₁, α₂ are the percentiles of θ over resamples, corrected for bias and skewness; NaN
     below two values. Values that are all equal give an interval of width zero. Where
-    leaving one value out never moves the statistic, BCa is undefined (0/0) and
-    percentiles are returned.
+    leaving one value out never moves the mean in floating point, BCa is undefined (0/0)
+    and percentiles are returned.
 
     Args:
         values: defined numbers, one per independent unit.
         confidence: coverage of the interval.
         seed: of the resampling.
-        statistic: takes an array and an `axis`.
 
     Source:
         Efron, "Better Bootstrap Confidence Intervals", JASA, 1987; `scipy.stats`.
@@ -93,10 +89,10 @@ def bootstrap_interval(
         return np.nan, np.nan
     if np.ptp(values) == 0:
         return float(values[0]), float(values[0])
-    left_out = [statistic(np.delete(values, i), axis=-1) for i in range(len(values))]
+    left_out = [np.delete(values, i).mean() for i in range(len(values))]
     found = bootstrap(
         (values,),
-        statistic,
+        np.mean,
         confidence_level=confidence,
         n_resamples=RESAMPLES,
         batch=500,
@@ -136,24 +132,6 @@ def paired_difference(
     difference = np.asarray(ours, float) - np.asarray(other, float)
     difference = difference[~np.isnan(difference)]
     return _summary(difference, bootstrap_interval(difference, confidence, seed))
-
-
-def interquartile_mean(
-    values: Float[np.ndarray, "..."], axis: int = -1
-) -> Float[np.ndarray, "..."]:
-    """Σ_{k<i≤n-k} x₍ᵢ₎/(n - 2k), k = ⌊n/4⌋: mean of the middle half [unit of x, 1].
-
-    Args:
-        values: numbers without NaN.
-        axis: the axis of independent units.
-
-    Source:
-        Agarwal et al., "Deep Reinforcement Learning at the Edge of the Statistical
-        Precipice", NeurIPS, 2021.
-    """
-    ordered = np.sort(np.moveaxis(np.asarray(values, float), axis, -1), axis=-1)
-    cut = ordered.shape[-1] // 4
-    return ordered[..., cut : ordered.shape[-1] - cut].mean(axis=-1)
 
 
 def _summary(defined: np.ndarray, interval: tuple[float, float]) -> Summary:

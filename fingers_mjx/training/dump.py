@@ -28,7 +28,7 @@ def dump_state(path: Path, carry: Carry) -> Path:
     rows = {k: v for k, v in worlds.items() if v.ndim and v.shape[0] == batch}
     free = LIMIT_BYTES - sum(a.nbytes for a in arrays.values()) - 2**20
     number = max(0, min(WORLDS, free * batch // sum(a.nbytes for a in rows.values())))
-    index = worst_worlds(rows, batch)[:number]
+    index = _worst_worlds(rows, batch)[:number]
     arrays |= {f"worlds/{k}": v[index] for k, v in rows.items()}
     buffer = io.BytesIO()
     np.savez(buffer, allow_pickle=False, **arrays, **{"worlds/index": index})
@@ -36,7 +36,7 @@ def dump_state(path: Path, carry: Carry) -> Path:
     return path
 
 
-def worst_worlds(rows: dict[str, np.ndarray], batch: int) -> np.ndarray:
+def _worst_worlds(rows: dict[str, np.ndarray], batch: int) -> np.ndarray:
     """Returns the numbers of all worlds, those with the most bad values first."""
     bad = np.zeros(batch, np.int64)
     for values in rows.values():

@@ -50,7 +50,11 @@ class Report:
     health: Array
 
     def fetch_sums(self) -> Float[np.ndarray, "k 2"]:
-        """Waits for the call and returns sum and weight of each metric."""
+        """Waits for the call and returns (Σ w x, Σ w) [its unit, 1] of each metric.
+
+        Source:
+            Ours, see `fingers_mjx.ppo.totals.total`.
+        """
         return np.asarray(self.sums)
 
     def fetch_health(self) -> dict[str, int]:

@@ -15,7 +15,7 @@ from fingers_mjx.runs.setup import make_env
 
 POLICIES = Path(fingers_mjx.__file__).parent / "policies"
 FOLDERS = sorted(path for path in POLICIES.iterdir() if path.is_dir())
-TOLD = {
+STATED = {
     "crawl": POLICIES.parents[1] / "README.md",
     "keyboard": POLICIES / "keyboard" / "README.md",
     "push": POLICIES / "push" / "README.md",
@@ -53,11 +53,11 @@ def test_its_interface_is_that_of_the_task_today(folder):
 def test_the_text_tells_what_was_measured(folder):
     measured = json.loads((folder / "evaluation.json").read_text("utf-8"))
     assert measured["task"] == folder.name
-    text = TOLD[folder.name].read_text("utf-8")
+    text = STATED[folder.name].read_text("utf-8")
     for name in MEASURES[folder.name]:
         value = measured["measures"][name]
         spellings = [
             f"{value['mean']:.{digits}f} ({value['low']:.{digits}f}–"
             for digits in (2, 3)
         ]
-        assert any(told in text for told in spellings), (name, spellings)
+        assert any(stated in text for stated in spellings), (name, spellings)

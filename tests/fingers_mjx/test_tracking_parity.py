@@ -36,18 +36,18 @@ def _palm(gravity_v):
     return unrotate(inverse, jnp.asarray(gravity_v))
 
 
-def both(change=lambda *told: told):
+def both(change=lambda *measured: measured):
     """Largest difference of each entry between the two over 200 steps."""
     tracker = deployed.ObjectTracker(TARGET, Q_OFF)
     step = jax.jit(trained.step_track)
     track, worst = None, np.zeros(9)
-    for told in frames(200):
-        t_s, pos, root, heading, gravity_b = told
+    for measured in frames(200):
+        t_s, pos, root, heading, gravity_b = measured
         frame = Frame(*(jnp.asarray(x, jnp.float32) for x in (t_s, pos, root, heading)))
         track = trained.start_track(frame) if track is None else step(track, frame)
         gravity_v = unrotate(jnp.array(Q_OFF), jnp.asarray(gravity_b))
         inputs = trained.track_inputs(track, jnp.asarray(TARGET), gravity_v)
-        *seen, gravity_b = change(*told)
+        *seen, gravity_b = change(*measured)
         tracker.update(deployed.Frame(*seen))
         ours = np.concatenate([np.asarray(x) for x in inputs.values()])
         worst = np.maximum(worst, np.abs(ours - tracker.inputs(gravity_b)))

@@ -89,7 +89,7 @@ def save_and_die(directory, point):
 
 
 def killed(directory, point):
-    """Lets a forked process save and die; tells whether it died at the point."""
+    """Lets a forked process save and die; returns whether it died at the point."""
     child = os.fork()
     if child == 0:
         save_and_die(directory, point)

@@ -80,12 +80,12 @@ def assert_same_end(path, other):
     assert differing == []
 
 
-def curve(path, *figures):
+def curve(path, *metrics):
     rows = read_metrics(path / "metrics.jsonl")
-    return [[row[name] for name in ("iteration", *figures)] for row in rows]
+    return [[row[name] for name in ("iteration", *metrics)] for row in rows]
 
 
-def tell(event):
+def report(event):
     print(json.dumps(event), flush=True)
     if event["event"] == "progress" and event["iteration"] == SLEEP_AT:
         print(json.dumps({"event": "note", "text": "asleep"}), flush=True)
@@ -97,6 +97,6 @@ if __name__ == "__main__":
     numbers = {name: int(value) for name, value in given.items()}
     SLEEP_AT = numbers.pop("sleep_at", -1)
     try:
-        run(Path(sys.argv[1]), "--resume" in sys.argv, tell, **numbers)
+        run(Path(sys.argv[1]), "--resume" in sys.argv, report, **numbers)
     except Interrupted as stopped:
         sys.exit(stopped.exit_code)

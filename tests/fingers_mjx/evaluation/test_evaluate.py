@@ -147,15 +147,15 @@ def test_batches_are_run_until_there_are_enough_episodes():
     def own_speed(obs):
         return obs["state"]
 
-    told = []
+    reported = []
     env = GlidingHands((0, 0, 0), auto_reset=True)
     wanted = Episodes(7, 100, jax.random.key(1))
-    table = evaluate(env, own_speed, wanted, progress=lambda *a: told.append(a))
+    table = evaluate(env, own_speed, wanted, progress=lambda *a: reported.append(a))
     speeds = table.columns["task_speed_mps"]
     assert speeds.shape == (7,)
     assert len(np.unique(speeds)) == 7, "batches must not repeat each other"
-    assert told[-1] == (300, 300)
-    assert told == sorted(told)
+    assert reported[-1] == (300, 300)
+    assert reported == sorted(reported)
 
 
 def test_the_key_decides_the_episodes():

@@ -1,11 +1,10 @@
 import numpy as np
 import pytest
-from scipy.stats import norm, trim_mean
+from scipy.stats import norm
 
 from envs.errors import InputError
 from fingers_mjx.evaluation.stats import (
     bootstrap_interval,
-    interquartile_mean,
     paired_difference,
     summarize,
 )
@@ -107,21 +106,8 @@ def test_paired_difference_leaves_out_undefined_seeds_and_refuses_other_lengths(
         paired_difference(np.zeros(3), np.zeros(2))
 
 
-@pytest.mark.parametrize("count", [1, 3, 4, 7, 12, 101])
-def test_interquartile_mean_agrees_with_scipy(count):
-    print("seed", SEED)
-    values = np.random.default_rng(SEED).normal(size=(3, count)) ** 3
-    found = interquartile_mean(values)
-    np.testing.assert_allclose(found, trim_mean(values, 0.25, axis=1))
-    np.testing.assert_allclose(interquartile_mean(values.T, axis=0), found)
-    if count == 101:
-        assert not np.allclose(found, values.mean(axis=1))
-
-
-def test_interval_of_an_interquartile_mean_even_where_bca_is_undefined():
-    scores = np.array([0.0] + [1.0] * 11)  # leaving any one out changes nothing
-    low, high = bootstrap_interval(scores, statistic=interquartile_mean)
-    assert low <= 1.0 == high
-    spread = np.random.default_rng(SEED).normal(size=24)
-    low, high = bootstrap_interval(spread, statistic=interquartile_mean)
-    assert low < interquartile_mean(spread) < high
+def test_interval_where_rounding_leaves_bca_undefined():
+    values = np.array([1.0, 1.0, np.nextafter(1.0, 2.0)])
+    low, high = bootstrap_interval(values)
+    assert low <= high
+    assert np.isfinite([low, high]).all()

@@ -58,7 +58,7 @@ def rollout(request, world, bundle):
 
 
 def measured(state):
-    """What encoders, IMU and operator tell, in the shim's words."""
+    """What encoders, IMU and operator report, in the shim's terms."""
     w, x, y, z = state.data.qpos[3:7]
     down_b = -np.array(
         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
@@ -71,7 +71,7 @@ def measured(state):
     }
 
 
-def differences(bundle, rollout, change=lambda told: told):
+def differences(bundle, rollout, change=lambda measured: measured):
     """Largest difference of observation, action and target over the rollout."""
     runtime, states = rollout
     controller = PolicyController(bundle, runtime)
@@ -123,22 +123,22 @@ def test_targets_are_equal_for_any_action(bundle, world):
         assert np.abs(ours - transform.step(target, 2 * action)).max() > 1e-3
 
 
-def swap_joints(told):
-    joints = np.array(told["joint_pos"])
+def swap_joints(measured):
+    joints = np.array(measured["joint_pos"])
     joints[[4, 8]] = joints[[8, 4]]
-    return told | {"joint_pos": joints}
+    return measured | {"joint_pos": joints}
 
 
-def flip_gravity(told):
-    return told | {"gravity_b": -told["gravity_b"]}
+def flip_gravity(measured):
+    return measured | {"gravity_b": -measured["gravity_b"]}
 
 
-def world_angvel(told):
-    return told | {"angvel_b": told["angvel_b"][::-1]}
+def world_angvel(measured):
+    return measured | {"angvel_b": measured["angvel_b"][::-1]}
 
 
-def degrees(told):
-    return told | {"joint_pos": np.degrees(told["joint_pos"])}
+def degrees(measured):
+    return measured | {"joint_pos": np.degrees(measured["joint_pos"])}
 
 
 WRONG = [swap_joints, flip_gravity, world_angvel, degrees]

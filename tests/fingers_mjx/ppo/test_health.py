@@ -39,7 +39,7 @@ with_gain.defvjp(lambda x, gain: (x, gain), lambda gain, up: (up * gain, gain * 
 
 
 def fake_loss(params, normalizer, data, key):
-    """A square of the parameters, spoiled at the site that the reward tells."""
+    """A square of the parameters, spoiled at the site that the reward names."""
     site, value = data.reward[0, 0], data.reward[0, 1]
 
     def at(name, x):
@@ -105,7 +105,7 @@ def test_bad_update_is_skipped_and_named(site, value):
     name = watched_names(before.params)[int(after.health.first_term)]
     assert name.startswith(site)
     assert int(after.health.first_iteration) == 0
-    assert totals["loss/total"][1] == 0.0  # does not count in the figures
+    assert totals["loss/total"][1] == 0.0  # does not count in the means
     assert all(np.isfinite(x).all() for x in jax.tree.leaves(after))
 
 

@@ -181,7 +181,7 @@ def test_fault_of_one_world_is_set_aside(site, value):
 
 
 def test_world_reported_invalid_does_not_teach():
-    """Its steps reach neither the loss, nor the normalizer, nor the figures."""
+    """Its steps reach neither the loss, nor the normalizer, nor the metrics."""
     fault = Fault("invalid", 1.0, at=0, until=10**9)
     (train, *_), totals = learn(probe("constant", fault=fault), 60)
     assert totals["invalid"][0] == 60 * 8

@@ -162,7 +162,7 @@ def add(path, rng):
 
 
 def damage_each_file(directory, rng, repeats):
-    """Damages each file of the newest checkpoint in each way; tells what is said."""
+    """Damages each file of the newest checkpoint in each way; yields what is said."""
     newest = checkpoint.checkpoints(directory)[-1]
     copy = directory / "copy"
     shutil.copytree(newest, copy)
@@ -177,7 +177,7 @@ def damage_each_file(directory, rng, repeats):
 
 
 @pytest.mark.parametrize("repeats", [2, pytest.param(20, marks=pytest.mark.slow)])
-def test_every_damage_is_found_and_told(tmp_path, repeats):
+def test_every_damage_is_found_and_reported(tmp_path, repeats):
     seed = random.randrange(10**6)
     print(f"seed {seed}")
     save(tmp_path, 1)

@@ -38,8 +38,8 @@ def make(path):
     return path
 
 
-def row(iteration, **figures):
-    return {"iteration": iteration, "time_s": 1e9 + iteration, **figures}
+def row(iteration, **numbers):
+    return {"iteration": iteration, "time_s": 1e9 + iteration, **numbers}
 
 
 def events(path):

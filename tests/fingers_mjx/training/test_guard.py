@@ -48,7 +48,7 @@ def test_other_signals_do_not_count():
         signal.signal(signal.SIGUSR1, old)
 
 
-def test_silence_ends_the_run_and_tells_where(monkeypatch, tmp_path, capfd):
+def test_silence_ends_the_run_and_names_where(monkeypatch, tmp_path, capfd):
     ended = threading.Event()
     monkeypatch.setattr(guard_watchdog.os, "_exit", lambda code: ended.set())
     with Watchdog(tmp_path / "hang.txt", limit_s=0.2, first_limit_s=0.2):

@@ -1,4 +1,4 @@
-"""Runs that are killed, hang or are told to stop go on as if nothing had happened.
+"""Runs that are killed, hang or are asked to stop go on as if nothing had happened.
 
 T1 (SIGKILL at random times), T3 (resumed = straight, for many seeds), T7 (SIGINT and
 SIGTERM), T11 (a run that hangs).
@@ -45,7 +45,7 @@ def read_until(process, event):
 
 
 def test_killed_run_goes_on_bit_equal(tmp_path):
-    """SIGKILL at random times; the last checkpoint whose save was told is not lost."""
+    """SIGKILL at random times; the last checkpoint that was reported is not lost."""
     seed = random.randrange(10**6)
     print(f"seed {seed}")
     kill_and_compare(tmp_path, random.Random(seed), kills=2)
@@ -57,8 +57,8 @@ def test_killed_run_goes_on_bit_equal_many_times(tmp_path, seed):
     kill_and_compare(tmp_path, random.Random(seed), kills=10)
 
 
-def told_checkpoints(output):
-    """Returns the iterations of the saves told in whole lines of `output`."""
+def reported_checkpoints(output):
+    """Returns the iterations of the saves reported in whole lines of `output`."""
     lines = [x for x in output.split(b"\n")[:-1] if x.startswith(b"{")]
     events = [json.loads(line) for line in lines]
     return [e["iteration"] for e in events if e["event"] == "checkpoint"]
@@ -67,17 +67,17 @@ def told_checkpoints(output):
 def kill_and_compare(tmp_path, rng, kills):
     settings = {"iterations": 12 * kills, "checkpoint_every": 1}
     words = [f"{k}={v}" for k, v in settings.items()]
-    path, told = tmp_path / "run", 0
+    path, reported = tmp_path / "run", 0
     for _ in range(kills):
         resume = ["--resume"] if (path / "config.yaml").exists() else []
         child = start(path, *resume, *words)
-        told = max(told, read_until(child, "checkpoint")["iteration"])
+        reported = max(reported, read_until(child, "checkpoint")["iteration"])
         time.sleep(rng.uniform(0.0, 1.0))
         child.send_signal(signal.SIGKILL)
-        told = max([told, *told_checkpoints(child.stdout.read())])
+        reported = max([reported, *reported_checkpoints(child.stdout.read())])
         child.wait()
         newest = checkpoint.newest(path / "checkpoints", print)
-        assert int(newest.name) >= told
+        assert int(newest.name) >= reported
     run(path, resume=True, **settings)
     assert not list((path / "checkpoints").glob(".*"))
     run(tmp_path / "straight", iterations=12 * kills)
@@ -112,7 +112,7 @@ def test_signal_at_any_time_saves_and_stops(tmp_path, number, seed):
     output, _ = child.communicate(timeout=60.0)
     assert child.returncode == 75
     at, _ = leaves(path)
-    assert at == told_checkpoints(output)[-1]
+    assert at == reported_checkpoints(output)[-1]
     run(path, resume=True, iterations=at + 1)
     assert leaves(path)[0] == at + 1
 
@@ -120,13 +120,13 @@ def test_signal_at_any_time_saves_and_stops(tmp_path, number, seed):
 def test_second_signal_ends_at_once_and_loses_nothing_saved(tmp_path):
     path = tmp_path / "run"
     child = start(path, "iterations=100000", "checkpoint_every=2", "sleep_at=5")
-    told = read_until(child, "checkpoint")["iteration"]
+    reported = read_until(child, "checkpoint")["iteration"]
     read_until(child, "note")  # asleep between two iterations
     child.send_signal(signal.SIGINT)
     read_until(child, "note")
     child.send_signal(signal.SIGINT)
     assert child.wait(60.0) == 128 + signal.SIGINT
-    assert leaves(path)[0] >= told
+    assert leaves(path)[0] >= reported
     run(path, resume=True, iterations=10)
 
 
@@ -136,14 +136,14 @@ def test_run_that_hangs_is_ended_and_goes_on(tmp_path):
     _, errors = child.communicate(timeout=120.0)
     assert child.returncode == 75
     assert b"no progress for" in errors
-    assert "in tell" in (path / "hang.txt").read_text(encoding="utf-8")
+    assert "in report" in (path / "hang.txt").read_text(encoding="utf-8")
     assert leaves(path)[0] == 6
     run(path, resume=True, hang_limit_s=300)
     run(tmp_path / "straight")
     assert_same_end(tmp_path / "straight", path)
 
 
-def test_signal_inside_is_told_by_the_checkpoint(tmp_path):
+def test_signal_inside_is_reported_with_the_checkpoint(tmp_path):
     def interrupt(event):
         if event["event"] == "progress" and event["iteration"] == 3:
             os.kill(os.getpid(), signal.SIGINT)

@@ -39,13 +39,13 @@ def test_lines_of_json_where_there_is_no_terminal():
     assert [json.loads(line)["event"] for line in lines] == ["progress", "note"]
 
 
-def test_compilation_is_told_now_and_then():
+def test_compilation_is_reported_now_and_then():
     stream = io.StringIO()
     with reporter(stream) as show:
         for second in range(25):
             show({"event": "compiling", "elapsed_s": second})
-    told = [json.loads(x)["elapsed_s"] for x in stream.getvalue().splitlines()]
-    assert told == [0, QUIET_S, 2 * QUIET_S]
+    times = [json.loads(x)["elapsed_s"] for x in stream.getvalue().splitlines()]
+    assert times == [0, QUIET_S, 2 * QUIET_S]
 
 
 def test_terminal_gets_a_picture():

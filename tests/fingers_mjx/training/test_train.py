@@ -64,14 +64,14 @@ def test_run_leaves_everything(straight):
 
 
 def test_resumed_run_is_bit_equal_to_a_straight_one(straight, tmp_path):
-    """Five iterations, then new objects and five more: every leaf and figure."""
+    """Five iterations, then new objects and five more: every leaf and metric."""
     path = tmp_path / "run"
     run(path, iterations=5)
     stopped = leaves(path)[1]
     run(path, resume=True)
     assert_same_end(straight[0], path)
-    figures = ("env_steps", "episode/return", "kl", "learning_rate")
-    assert curve(path, *figures) == curve(straight[0], *figures)
+    metrics = ("env_steps", "episode/return", "kl", "learning_rate")
+    assert curve(path, *metrics) == curve(straight[0], *metrics)
     assert any(stopped[k].tobytes() != v.tobytes() for k, v in leaves(path)[1].items())
 
 
@@ -191,7 +191,7 @@ def test_policy_read_back_acts_like_the_network(straight):
     assert policy.meta["env_steps"] == 640
 
 
-def test_damaged_checkpoint_is_passed_over_and_told(straight, tmp_path):
+def test_damaged_checkpoint_is_passed_over_and_reported(straight, tmp_path):
     path = tmp_path / "run"
     run(path, iterations=6)
     (path / "checkpoints" / "00000006" / "meta.json").unlink()
@@ -268,8 +268,8 @@ def test_dropped_contacts_stop_the_run(tmp_path):
     path, room = tmp_path / "run", HandSettings(contacts_per_world=48)
     with pytest.raises(InputError) as error:
         train(overflowing(), setup(config, room), path)
-    told = "iteration 2: contacts dropped in 1 of 16 worlds: env.contacts_per_world: "
-    assert str(error.value).startswith(told + "found 48; valid: about 96, or on_over")
+    begins = "iteration 2: contacts dropped in 1 of 16 worlds: env.contacts_per_world: "
+    assert str(error.value).startswith(begins + "found 48; valid: about 96, or on_over")
     assert leaves(path)[0] == 1
 
     # Only the room may be changed on the way; nothing else of the task.
@@ -281,7 +281,7 @@ def test_dropped_contacts_stop_the_run(tmp_path):
     assert result.iterations == 10
 
 
-def test_a_run_can_be_told_to_go_on_without_dropped_contacts(tmp_path):
+def test_a_run_can_be_set_to_go_on_without_dropped_contacts(tmp_path):
     """T9: it says so after the row of the iteration in which it happened."""
     events, config = [], train_setup.config(on_overflow="warn")
     path, room = tmp_path / "run", HandSettings()
@@ -298,7 +298,7 @@ def poisoned(fault):
     return probe("seen_action", 16, length=3, fault=fault)
 
 
-def test_fault_of_a_world_is_told_with_its_number(tmp_path):
+def test_fault_of_a_world_is_reported_with_its_number(tmp_path):
     events = []
     env = poisoned(Fault("reward", np.nan, world=7, at=5))
     result = train(env, setup(), tmp_path / "run", on_progress=events.append)
@@ -311,7 +311,7 @@ def test_fault_of_a_world_is_told_with_its_number(tmp_path):
 
 
 def test_divergence_names_term_step_and_state(tmp_path):
-    """Rewards too large to square: finite themselves, so only the update can tell."""
+    """Rewards too large to square: finite themselves, so only the update shows it."""
     env = poisoned(Fault("reward", 3e38, world=7, at=9, until=10**9))
     config = train_setup.config(ppo={"max_bad_updates": 1})
     with pytest.raises(Diverged) as error:
