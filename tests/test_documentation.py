@@ -97,21 +97,18 @@ def test_presets_in_the_training_guide_are_those_of_the_code():
 
 
 @pytest.mark.parametrize(
-    ("guide", "heading", "table"),
+    ("page", "table"),
     [
-        ("reference/crawl.md", "# ", "CRAWL"),
-        ("guides/tasks.md", "## Fall recovery", "RECOVERY"),
-        ("guides/tasks.md", "## Keyboard pressing", "KEYBOARD"),
-        ("reference/push.md", "# ", "PUSH"),
+        ("crawl.md", "CRAWL"),
+        ("recovery.md", "RECOVERY"),
+        ("keyboard.md", "KEYBOARD"),
+        ("push.md", "PUSH"),
     ],
 )
-def test_rewards_in_the_guides_are_those_of_the_code(guide, heading, table):
+def test_rewards_in_the_reference_are_those_of_the_code(page, table):
     import rewards
 
-    text = (ROOT / "docs" / guide).read_text("utf-8")
-    _, _, text = text.partition(heading)
-    if heading != "# ":
-        text = text.partition("\n## ")[0]
+    text = (ROOT / "docs" / "reference" / page).read_text("utf-8")
     rows = re.findall(r"^\| (`[\w`, ]+`) \| (?:[−\d]|as crawl)", text, re.MULTILINE)
     names = [name for row in rows for name in re.findall(r"\w+", row)]
     assert sorted(names) == sorted(row.name for row in getattr(rewards, table))
