@@ -62,5 +62,13 @@ class VectorEnv(Protocol):
         ...
 
     def step(self, state: State, action: Float[Array, "b a"]) -> State:
-        """Advances every world by one control step."""
+        """Advances every world by one control step, x ← f(x, a).
+
+        Args:
+            state: of all worlds.
+            action: policy outputs [1].
+
+        Source:
+            Ours; the layout of the state is that of Brax and MuJoCo Playground.
+        """
         ...

@@ -1,58 +1,23 @@
 """Many worlds at once, each restarted when its episode ends."""
 
-from typing import Any, Protocol
+from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State
-
-
-class Env(Protocol):
-    """One world of a task."""
-
-    @property
-    def action_size(self) -> int:
-        """Joints that the policy commands."""
-        ...
-
-    @property
-    def observation_size(self) -> dict[str, int]:
-        """Entries of each observation by name."""
-        ...
-
-    @property
-    def dt(self) -> float:
-        """Control interval [s]."""
-        ...
-
-    @property
-    def episode_length(self) -> int:
-        """Control steps of an episode that no failure ends."""
-        ...
-
-    def reset(self, key: Array) -> State:
-        """Begins a new world."""
-        ...
-
-    def restart(self, state: State) -> State:
-        """Begins the next episode of the same world."""
-        ...
-
-    def step(self, state: State, action: Array) -> State:
-        """Advances one control step."""
-        ...
+from envs.env import HandEnv
 
 
 class BatchEnv:
     """`num_envs` worlds of an environment, vmapped, with auto-reset.
 
     Where a step ends an episode, everything but reward, done, metrics, signals and info
-    is that of the next episode's start.
+    is that of the next episode's start. It is an `envs.base.VectorEnv`.
     """
 
-    def __init__(self, env: Env, num_envs: int, auto_reset: bool = True):
+    def __init__(self, env: HandEnv, num_envs: int, auto_reset: bool = True):
         self.env, self.num_envs, self.auto_reset = env, num_envs, auto_reset
 
     def __getattr__(self, name: str) -> Any:
@@ -73,12 +38,23 @@ class BatchEnv:
         """Control interval [s]."""
         return self.env.dt
 
-    def reset(self, key: Array) -> State:
+    def reset(self, key: PRNGKeyArray) -> State:
         """Begins `num_envs` worlds, world i from the i-th split of the key."""
         return jax.vmap(self.env.reset)(jax.random.split(key, self.num_envs))
 
     def step(self, state: State, action: Float[Array, "b a"]) -> State:
-        """Advances every world by one control step."""
+        """Advances every world by one control step, x_i ← f(x_i, a_i).
+
+        Args:
+            state: of all worlds.
+            action: policy outputs [1].
+
+        Returns:
+            The states after it; with auto-reset, those of ended episodes begin anew.
+
+        Source:
+            Ours; the layout of the state is that of Brax and MuJoCo Playground.
+        """
         state = self._forget_ended(state)
         after = jax.vmap(self.env.step)(state, action)
         if not self.auto_reset:

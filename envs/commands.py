@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.errors import check_ordered
 from envs.observations import InputTerm
@@ -39,8 +39,19 @@ class CommandConfig:
         check_ordered(self, "vel_x_mps", "vel_y_mps", "yaw_rate_rps")
 
 
-def sample_command(key: Array, config: CommandConfig) -> Float[Array, "3"]:
-    """Draws v_x, v_y [m/s] and the yaw rate [rad/s]."""
+def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"]:
+    """Draws a command, c = (1 − b) u with u ~ U(low, high) and b ~ Bernoulli(p).
+
+    Args:
+        key: of the draw.
+        config: ranges, and the share p of standing commands.
+
+    Returns:
+        v_x, v_y [m/s] and the yaw rate [rad/s] in V.
+
+    Source:
+        Paper, crawling (ranges); standing commands are ours.
+    """
     ranges = (config.vel_x_mps, config.vel_y_mps, config.yaw_rate_rps)
     low, high = jnp.array(ranges).T
     command = jax.random.uniform(stream(key, "command"), (3,), minval=low, maxval=high)

@@ -6,7 +6,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import mujoco
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from envs.base import State
 from envs.hand.effect_parts import friction_rows
@@ -125,7 +125,7 @@ class HandEnv:
         fields = self.plant.effects.change(fields)
         return self.task.vary_scene(self.plant, fields, world)
 
-    def reset(self, key: Array) -> State:
+    def reset(self, key: PRNGKeyArray) -> State:
         """Begins a new world: its draw of the randomization and its first episode."""
         config = self.config
         world = PerWorldState(
@@ -146,14 +146,17 @@ class HandEnv:
         return self._start(world.replace(episodes=world.episodes + 1))
 
     def step(self, state: State, action: Float[Array, "20"]) -> State:
-        """Advances one control step.
+        """Advances one control step, θ ← clip(θ + α tanh(clip(a, ±c)), joint limits).
 
         Args:
             state: the state before.
-            action: policy output; clipped, squashed by tanh, scaled and added to the
-                joint targets.
+            action: policy output a [1], which moves the joint targets θ [rad].
+
+        Source:
+            Paper, policy interfaces.
         """
-        memory, config = state.memory, self.config
+        config = self.config
+        memory, action = self.task.override(self.plant, state.memory, action)
         action = jnp.clip(action, -config.action_clip, config.action_clip)
         target = self.plant.next_target(memory.target, action, config.action_scale_rad)
         drive, output, invalid = self.plant.step(
@@ -236,13 +239,19 @@ class HandEnv:
         action: Float[Array, "20"],
         carried: Mapping[str, Any],
     ) -> Signals:
-        """All signals of a control step.
+        """All signals of a control step, s = h(x_t, x_{t+1}, a_t).
 
         Args:
             before: the state before.
             output: result of the physics.
-            action: clipped policy output of this step.
+            action: clipped policy output of this step [1].
             carried: fields of the `Memory` before the step.
+
+        Returns:
+            Quantities in SI units ([m], [rad], [N·m]); see `envs.signals`.
+
+        Source:
+            Ours.
         """
         asked = Command(carried["command"], action, carried["action"])
         q_off = jnp.array(self.stance.q_off)
@@ -251,7 +260,7 @@ class HandEnv:
         return signals.replace(extra=extra)
 
     def sample(self, data: PhysicsState, carried: Mapping[str, Any]) -> Sample:
-        """What the actor is told, relative to the settled stance.
+        """What the actor observes, relative to the settled stance.
 
         Args:
             data: the state that is measured.
@@ -262,12 +271,12 @@ class HandEnv:
         drive, q = self.plant.drive, data.qpos[JOINT_QPOS]
         joints = drive.reading(carried["drive"], q) - reference
         imu = effects.sense(imu_of(data, effects.down_w))
-        told = sense(noise, carried["world"], joints, imu, carried["action"])
-        return told.replace(inputs=self.task.inputs(carried, told))
+        sample = sense(noise, carried["world"], joints, imu, carried["action"])
+        return sample.replace(inputs=self.task.inputs(carried, sample))
 
     def _observations(
         self, data: PhysicsState, signals: Signals, carried: Mapping[str, Any]
-    ) -> dict[str, Array]:
+    ) -> dict[str, Float[Array, " n"]]:
         """The actor's inputs; the critic adds base state, torque and tip force."""
         actor = flatten(carried["history"], self.input_terms)
         base = [data.qpos[2:3], signals.vel_v, signals.angvel_v, signals.gravity_b]
@@ -276,8 +285,11 @@ class HandEnv:
         return {"state": actor, "privileged_state": jnp.concatenate([actor, *extra])}
 
     def _metrics(
-        self, terms: dict[str, Array], signals: Signals, output: PhysicsOutput
-    ) -> dict[str, Array]:
+        self,
+        terms: dict[str, Float[Array, ""]],
+        signals: Signals,
+        output: PhysicsOutput,
+    ) -> dict[str, Float[Array, ""]]:
         """Per-step scalars: reward terms, the task's measures, buffer overflow."""
         named = {f"reward/{name}": value for name, value in terms.items()}
         room = overflow_metrics(output.overflow)

@@ -3,11 +3,13 @@
 from typing import Any
 
 import flax.struct
-from jaxtyping import Array, Float, Int
+import jax
+from jaxtyping import Array, Float, Int, Key, PRNGKeyArray
 
 from envs.hand.drive.drive import DriveState
 from envs.observations import Sample
 from envs.randomize import Variation
+from envs.streams import stream
 from rewards import Schedule
 
 
@@ -25,13 +27,18 @@ class PerWorldState:
         task: what else the task keeps of the world, a pytree of its own.
     """
 
-    key: Array
+    key: Key[Array, "*b"]
     variation: Variation
     weights: dict[str, Schedule]
     total_steps: Int[Array, "*b"]
     episodes: Int[Array, "*b"]
     footprint: Any = None
     task: Any = None
+
+    def step_key(self, name: str) -> PRNGKeyArray:
+        """Key of what is drawn under this name in the coming control step."""
+        key = jax.random.fold_in(stream(self.key, name), self.total_steps)
+        return jax.random.fold_in(key, self.episodes)
 
 
 @flax.struct.dataclass

@@ -38,8 +38,8 @@ class Sample:
 
     Attributes:
         joint_pos: joint angles minus the reference angles [rad].
-        gravity: unit vector of gravity in the palm frame, as the IMU tells it.
-        angvel: angular velocity in the palm frame [rad/s], as the IMU tells it.
+        gravity: unit vector of gravity in the palm frame, as the IMU measures it.
+        angvel: angular velocity in the palm frame [rad/s], as the IMU measures it.
         action: previous clipped policy output a_t.
         inputs: the task's inputs by name of their term.
     """
@@ -64,7 +64,18 @@ def push(history: Sample, sample: Sample) -> Sample:
 
 
 def flatten(history: Sample, input_terms: tuple[InputTerm, ...]) -> Float[Array, " n"]:
-    """The observation vector, [8 × joint_pos, 8 × gravity, …, 8 × last input term]."""
+    """The observation vector o = [8 × joint_pos, 8 × gravity, …, 8 × last input term].
+
+    Args:
+        history: eight samples of each term, oldest first.
+        input_terms: the task's terms, in their order.
+
+    Returns:
+        All entries in one vector, each in the unit of its term ([rad], [rad/s], [1]).
+
+    Source:
+        Paper, policy interfaces.
+    """
     common = [getattr(history, name) for name in TERMS]
     inputs = [history.inputs[term.name] for term in input_terms]
     return jnp.concatenate([x.reshape(-1) for x in (*common, *inputs)])

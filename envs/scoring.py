@@ -62,7 +62,9 @@ def score(
     dt_s: float,
     valid: Bool[Array, ""],
 ) -> tuple[PerWorldState, Float[Array, ""], dict[str, Float[Array, ""]]]:
-    """Evaluates the table with the weights of this step, and counts the step.
+    """Evaluates the table with the weights of this step, r = Σ_k w_k(n) m_k Δt.
+
+    The step is counted, n ← n + 1, also where it is not valid.
 
     Args:
         table: reward table.
@@ -72,7 +74,10 @@ def score(
         valid: whether the step counts; an invalid one pays nothing.
 
     Returns:
-        The world after the step, the reward and its terms.
+        The world after the step, the reward and its terms [1].
+
+    Source:
+        Ours; see `rewards.evaluate`.
     """
     weights = weights_at(world.weights, world.total_steps)
     total, terms = evaluate(table, named, weights, dt_s)

@@ -1,4 +1,4 @@
-"""The sensors of one world: what encoders and IMU tell, with bias and noise."""
+"""The sensors of one world: what encoders and IMU measure, with bias and noise."""
 
 import jax
 from jaxtyping import Array, Float
@@ -14,7 +14,7 @@ from rewards import safe_norm
 
 
 def imu_of(data: PhysicsState, down_w: Float[Array, "3"]) -> Imu:
-    """What an IMU in the palm tells without error.
+    """What an IMU in the palm measures without error.
 
     Args:
         data: the state that is measured.
@@ -30,18 +30,17 @@ def sense(
     imu: Imu,
     action: Float[Array, "20"],
 ) -> Sample:
-    """What the actor is told of one control step, but for the task's inputs.
+    """What the actor observes of one control step, but for the task's inputs.
 
     Args:
         config: bounds of the noise.
         world: the world's biases, and what its fresh noise is drawn from.
         joint_pos: joint angles less those that read as zero [rad].
-        imu: what a perfectly mounted IMU tells.
+        imu: what a perfectly mounted IMU measures.
         action: last clipped policy output.
     """
     variation = world.variation
-    key = jax.random.fold_in(stream(world.key, "noise"), world.total_steps)
-    key = jax.random.fold_in(key, world.episodes)
+    key = world.step_key("noise")
 
     def noisy(name: str, value: Array, bound: float) -> Array:
         noise = jax.random.uniform(stream(key, name), value.shape, minval=-1.0)

@@ -7,7 +7,7 @@ turns with the palm and is level in the nominal stance (x forward, z up).
 import flax.struct
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Shaped
 
 from envs.hand.figures import figures
 from envs.hand.model import PALM, PAYLOAD, V_SITE
@@ -21,6 +21,7 @@ from envs.hand.spec import (
 )
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.rotations import multiply, rotate, unrotate
+from rewards import safe_norm
 
 
 @flax.struct.dataclass
@@ -74,7 +75,7 @@ class Signals:
     command: Float[Array, "*b 3"]
     action: Float[Array, "*b 20"]
     previous_action: Float[Array, "*b 20"]
-    extra: dict[str, Array] = flax.struct.field(default_factory=dict)
+    extra: dict[str, Shaped[Array, "..."]] = flax.struct.field(default_factory=dict)
 
 
 @flax.struct.dataclass
@@ -100,7 +101,10 @@ def extract_signals(
     asked: Command,
     dt_s: float,
 ) -> Signals:
-    """Reads all signals of one hand after a control step.
+    """Reads all signals of one hand after a control step, s = h(x_t, x_{t+1}, y_{t+1}).
+
+    With orientation Q of the palm: ω_V = q_off* ⊗ ω_b ⊗ q_off, v_V = V* ⊗ v_w ⊗ V with
+    V = Q ⊗ q_off, q̈ ≈ (q̇_{t+1} − q̇_t)/Δt.
 
     Joints and base come from the state; fingertips, torques and contacts from the
     sensors, which every backend leaves one physics step (5 ms) behind. Tip quantities
@@ -112,7 +116,13 @@ def extract_signals(
         before: physics state before the control step.
         output: result of the control step.
         asked: command and actions.
-        dt_s: control interval [s].
+        dt_s: control interval Δt [s].
+
+    Returns:
+        Quantities in SI units ([m], [rad], [N·m]), see `Signals`.
+
+    Source:
+        Paper, frames; the finite difference and the sensors' delay are ours.
     """
     state, sensors = output.state, output.sensordata
     quat_w, angvel_b = state.qpos[3:7], state.qvel[3:6]
@@ -138,7 +148,19 @@ def extract_signals(
 
 
 def gravity(quat_w: Float[Array, "4"]) -> Float[Array, "3"]:
-    """Unit vector of gravity in a frame of the given orientation."""
+    """Unit vector of gravity in a frame of the given orientation.
+
+    g = q* ⊗ (0, 0, −1) ⊗ q.
+
+    Args:
+        quat_w: orientation q of the frame, w x y z.
+
+    Returns:
+        Direction [1], pointing down.
+
+    Source:
+        Paper, policy interfaces (projected gravity).
+    """
     return unrotate(quat_w, jnp.array([0.0, 0.0, -1.0]))
 
 
@@ -146,12 +168,33 @@ def tilt(v_quat_w: Float[Array, "4"]) -> Float[Array, "2"]:
     """Roll and pitch of V against level [rad], in (−π, π] and [−π/2, π/2].
 
     With the world's up direction u in V: roll = atan2(u_y, u_z), pitch = asin(−u_x).
+
+    Source:
+        The z-y-x Euler angles, as in Siciliano et al., "Robotics: Modelling, Planning
+        and Control" (2009), ch. 2.
     """
     up = -gravity(v_quat_w)
     return jnp.stack([jnp.arctan2(up[1], up[2]), _arcsin(-up[0])])
 
 
-def _tip_signals(spec: HandSpec, sensors: Float[Array, " n"]) -> dict[str, Array]:
+def tilt_from_level(gravity_v: Float[Array, "3"]) -> Float[Array, ""]:
+    """Angle between V's upward axis and up, θ = atan2(√(g_x² + g_y²), −g_z).
+
+    Args:
+        gravity_v: unit vector g of gravity in V [1].
+
+    Returns:
+        θ [rad] in [0, π]; its gradient is finite where V is level.
+
+    Source:
+        Paper, fall recovery (stance-relative tilt).
+    """
+    return jnp.arctan2(safe_norm(gravity_v[:2]), -gravity_v[2])
+
+
+def _tip_signals(
+    spec: HandSpec, sensors: Float[Array, " n"]
+) -> dict[str, Float[Array, "..."]]:
     """Positions, velocities and pad tilts of the five tips."""
     base_pos, base_quat, base_vel, base_angvel = (
         spec.read(sensors, f"{kind}_{V_SITE}")

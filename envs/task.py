@@ -1,219 +1,164 @@
 """What a task adds to the hand: scene, start, inputs, rewards, ends and measures."""
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, Protocol
+from dataclasses import dataclass, field
+from typing import Any, Self
 
 import jax.numpy as jnp
 import mujoco
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
 from envs.commands import command_term
+from envs.hand.hand_file import HandFile
+from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
-from envs.plant import Plant
+from envs.plant import Plant, check_interval
 from envs.randomize import RandomizeConfig
 from envs.signals import Signals
 from rewards import RewardTable
 
 
-class HandConfig(Protocol):
-    """The settings that every task has; for their meaning see `envs.tasks.crawl`."""
+@dataclass(frozen=True)
+class HandSettings:
+    """Settings that every task has; a task inherits them and adds its own.
 
-    @property
-    def episode_s(self) -> float:
-        """Episode length [s]."""
-        ...
+    Attributes:
+        episode_s: episode length (paper).
+        control_dt_s: control interval (paper: 50 Hz).
+        action_scale_rad: α, joint-target increment at full action (paper, by task).
+        action_clip: the policy output is clipped to ± this (ours; the paper clips
+            without giving the bound).
+        curriculum_scale: factor on the steps of the reward schedules; 1 is the
+            paper's, which is made for 8,000 iterations of 24 steps.
+        weights: reward weights that replace the start value of the table's.
+        randomize: domain randomization.
+        contacts_per_world, constraints_per_world: room for contacts and constraint
+            rows on the warp backend, see `make_physics`; what does not fit
+            is dropped, and reported (`envs.physics.room`).
+    """
 
-    @property
-    def control_dt_s(self) -> float:
-        """Control interval [s]."""
-        ...
+    episode_s: float = field(
+        default=20.0, metadata={"unit": "s", "low": 0.1, "high": 1e6}
+    )
+    control_dt_s: float = field(default=0.02, metadata={"unit": "s", "low": 0.005})
+    action_scale_rad: float = field(default=0.060, metadata={"unit": "rad", "low": 0.0})
+    action_clip: float = field(default=1.5, metadata={"unit": "1", "low": 0.1})
+    curriculum_scale: float = field(default=1.0, metadata={"unit": "1", "low": 1e-3})
+    weights: dict[str, float] = field(default_factory=dict)
+    randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
+    contacts_per_world: int = field(default=48, metadata={"low": 1, "free": True})
+    constraints_per_world: int = field(default=128, metadata={"low": 1, "free": True})
 
-    @property
-    def action_scale_rad(self) -> float:
-        """α, joint-target increment at full action [rad]."""
-        ...
-
-    @property
-    def action_clip(self) -> float:
-        """The policy output is clipped to ± this."""
-        ...
-
-    @property
-    def curriculum_scale(self) -> float:
-        """Factor on the steps of the reward schedules."""
-        ...
-
-    @property
-    def weights(self) -> dict[str, float]:
-        """Reward weights in the place of the table's."""
-        ...
-
-    @property
-    def randomize(self) -> RandomizeConfig:
-        """Domain randomization."""
-        ...
-
-    @property
-    def contacts_per_world(self) -> int:
-        """Room for contacts on the warp backend, as a mean over the worlds."""
-        ...
-
-    @property
-    def constraints_per_world(self) -> int:
-        """Room for constraint rows on the warp backend, in each world."""
-        ...
+    def __post_init__(self) -> None:
+        check_interval(self.control_dt_s)
 
 
-class HandTask(Protocol):
+class HandTask(ABC):
     """A task for `envs.env.HandEnv`, which does everything else.
 
     All methods are pure functions of one world. A task keeps what it carries in fields
     of `PerWorldState` and `Memory`; both have a field `task` for a pytree of its own.
-    Where a method takes `carried`, these are the fields of a `Memory` by name.
-    `BareTask` has the methods that a task without a scene and inputs of its own does
-    not need.
-    """
-
-    @property
-    def config(self) -> HandConfig:
-        """Settings of the task."""
-        ...
-
-    @property
-    def table(self) -> RewardTable:
-        """Rows of the reward."""
-        ...
-
-    @property
-    def input_terms(self) -> tuple[InputTerm, ...]:
-        """The task's inputs to the policy, in their order."""
-        ...
-
-    def add_scene(self, spec: mujoco.MjSpec) -> None:
-        """Adds bodies, joints and sensors of the task, but no actuators."""
-        ...
-
-    def vary_scene(
-        self, plant: Plant, fields: ModelFields, world: PerWorldState
-    ) -> ModelFields:
-        """Model fields of a world, from those in which its hand differs."""
-        ...
-
-    def begin_world(self) -> dict[str, Any]:
-        """The task's fields of `PerWorldState` in a new world."""
-        ...
-
-    def start(
-        self, key: Array, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
-        """First physics state of an episode and the joint targets [rad] held in it."""
-        ...
-
-    def begin_episode(
-        self, key: Array, world: PerWorldState, state: PhysicsState
-    ) -> dict[str, Any]:
-        """The task's fields of `Memory` at an episode's start in a physics state."""
-        ...
-
-    def inputs(self, carried: Mapping[str, Any], told: Sample) -> dict[str, Array]:
-        """The task's inputs by name of their term.
-
-        Args:
-            carried: fields of the `Memory`.
-            told: the sensors of this step, without inputs.
-        """
-        ...
-
-    def scene_signals(
-        self,
-        plant: Plant,
-        carried: Mapping[str, Any],
-        signals: Signals,
-        output: PhysicsOutput,
-    ) -> dict[str, Array]:
-        """The task's own signals by name, which become `Signals.extra`.
-
-        Rewards bind them, terminations and measures read them, and evaluations record
-        them. At an episode's start they are read too.
-        """
-        ...
-
-    def privileged(
-        self, carried: Mapping[str, Any], signals: Signals
-    ) -> Float[Array, " n"]:
-        """What the critic sees of the task besides the actor's inputs."""
-        ...
-
-    def magnitudes(
-        self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
-    ) -> tuple[Memory, dict[str, Array]]:
-        """Steps the memories of the rewards; returns what the table binds to by name.
-
-        Where the step is not `valid`, nothing of it may enter what outlives the
-        episode.
-        """
-        ...
-
-    def terminated(self, signals: Signals) -> Bool[Array, ""]:
-        """Whether the task ends the episode, other than by time."""
-        ...
-
-    def advance(self, memory: Memory, signals: Signals) -> Memory:
-        """Prepares the task's fields for the next step, such as a new command.
-
-        All that inputs and signals depend on changes here, and not in `magnitudes`:
-        the closed loop in C MuJoCo knows no rewards.
-        """
-        ...
-
-    def measures(self, signals: Signals) -> dict[str, Float[Array, ""]]:
-        """Per-step scalars for the log."""
-        ...
-
-    def episode_measures(
-        self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
-    ) -> dict[str, Float[Array, ""]]:
-        """The task's own measures of a whole episode, NaN where undefined.
-
-        Args:
-            recorded: signals over the control steps T by name, those of
-                `scene_signals` and what evaluations record of every task, such as
-                `joint_pos`, `palm_pos_w`, `palm_quat_w`, `failed`.
-            counts: the steps that count, up to the end of the episode.
-        """
-        ...
-
-
-class BareTask:
-    """The hand alone under a command, which is all that its policy is told.
+    Where a method takes `carried`, these are the fields of a `Memory` by name. What is
+    not abstract here is that of the hand alone under a command.
 
     Attributes:
-        config: settings with `command`, the ranges of the commands.
+        config: settings of the task; with `command`, the ranges of the commands, unless
+            the task has inputs of its own.
+        table: rows of the reward; they bind signals and the results of `magnitudes`.
     """
 
     config: Any
+    table: RewardTable
+
+    @classmethod
+    def on(cls, config: Any, hand: HandFile, stance: Stance) -> Self:
+        """The task for a hand that stands in its settled stance."""
+        del hand, stance
+        return cls(config)  # pyright: ignore[reportCallIssue]
 
     @property
     def input_terms(self) -> tuple[InputTerm, ...]:
-        """The command."""
+        """The task's inputs to the policy, in their order: the command."""
         return (command_term(self.config.command),)
 
-    def inputs(self, carried: Mapping[str, Any], told: Sample) -> dict[str, Array]:
-        """The command: v_x, v_y [m/s] and yaw rate [rad/s]."""
-        del told
-        return {"command": carried["command"]}
-
     def add_scene(self, spec: mujoco.MjSpec) -> None:
-        """Nothing but floor and hand."""
+        """Adds bodies, joints and sensors of the task, but no actuators: none."""
+        del spec
 
     def vary_scene(
         self, plant: Plant, fields: ModelFields, world: PerWorldState
     ) -> ModelFields:
-        """Only the hand differs."""
+        """Model fields of a world, from those in which its hand differs: these only."""
         del plant, world
         return fields
+
+    def begin_world(self) -> dict[str, Any]:
+        """The task's fields of `PerWorldState` in a new world: none."""
+        return {}
+
+    @abstractmethod
+    def start(
+        self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
+    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+        """First state, x_0 = f(key), of an episode, and the joint targets held in it.
+
+        Args:
+            key: of the episode.
+            plant: the hand and its settled stance.
+            world: what the episodes of this world share.
+
+        Returns:
+            Positions [m, rad] and velocities [m/s, rad/s], and targets [rad].
+
+        Source:
+            Ours; each task names its own.
+        """
+
+    @abstractmethod
+    def begin_episode(
+        self, key: PRNGKeyArray, world: PerWorldState, state: PhysicsState
+    ) -> dict[str, Any]:
+        """The task's fields of `Memory` at an episode's start in a physics state."""
+
+    def inputs(
+        self, carried: Mapping[str, Any], sample: Sample
+    ) -> dict[str, Float[Array, " n"]]:
+        """The task's inputs, g_t = h(μ_t, o_t), by name of their term: the command.
+
+        Args:
+            carried: fields of the `Memory`.
+            sample: readings of this step's sensors, still without inputs.
+
+        Returns:
+            In the units of `input_terms`; here v_x, v_y [m/s] and yaw rate [rad/s].
+
+        Source:
+            Paper, policy interfaces.
+        """
+        del sample
+        return {"command": carried["command"]}
+
+    def override(
+        self, plant: Plant, memory: Memory, action: Float[Array, "20"]
+    ) -> tuple[Memory, Float[Array, "20"]]:
+        """What is done in the place of the policy's output a: a ← a.
+
+        Args:
+            plant: the hand.
+            memory: before the step.
+            action: a, not yet clipped [1].
+
+        Returns:
+            The memory before the step, and the output that takes effect [1].
+
+        Source:
+            Ours: a supervisor such as the settle ramp acts through the policy's output.
+        """
+        del plant
+        return memory, action
 
     def scene_signals(
         self,
@@ -221,21 +166,103 @@ class BareTask:
         carried: Mapping[str, Any],
         signals: Signals,
         output: PhysicsOutput,
-    ) -> dict[str, Array]:
-        """None."""
+    ) -> dict[str, Shaped[Array, "..."]]:
+        """The task's own signals s = h(x) by name, which become `Signals.extra`: none.
+
+        Rewards bind them, terminations and measures read them, and evaluations record
+        them. At an episode's start they are read too.
+
+        Returns:
+            Each in the unit that its name ends with ([m], [rad], [s]), else [1].
+
+        Source:
+            Ours.
+        """
         del plant, carried, signals, output
         return {}
 
     def privileged(
         self, carried: Mapping[str, Any], signals: Signals
     ) -> Float[Array, " n"]:
-        """Nothing."""
+        """What the critic sees of the task besides the actor's inputs: n = 0 numbers.
+
+        Returns:
+            Entries in SI units ([m], [m/s], [rad]), without noise and delay.
+
+        Source:
+            Pinto et al., "Asymmetric Actor Critic for Image-Based Robot Learning"
+            (2018), for a critic that sees the state.
+        """
         del carried, signals
         return jnp.zeros(0)
 
+    def magnitudes(
+        self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
+    ) -> tuple[Memory, dict[str, Float[Array, "..."]]]:
+        """Steps the memories of the rewards, (μ, m) ← f(μ, s): none.
+
+        Args:
+            memory: μ, of this step.
+            signals: s.
+            valid: where it is not, nothing may enter what outlives the episode.
+
+        Returns:
+            The memory, and by name what the table binds besides signals, in the units
+            that the kernels name ([m], [m/s], [rad]).
+
+        Source:
+            Ours; the kernels name theirs.
+        """
+        del signals, valid
+        return memory, {}
+
+    @abstractmethod
+    def terminated(self, signals: Signals) -> Bool[Array, ""]:
+        """Whether the task ends the episode, other than by time: s ∈ failures.
+
+        Returns:
+            One flag [1].
+
+        Source:
+            Ours; each task names its own.
+        """
+
+    def advance(self, memory: Memory, signals: Signals) -> Memory:
+        """Prepares the task's fields for the next step, such as a new command: nothing.
+
+        All that inputs and signals depend on changes here, and not in `magnitudes`:
+        the closed loop in C MuJoCo knows no rewards.
+        """
+        del signals
+        return memory
+
+    @abstractmethod
+    def measures(self, signals: Signals) -> dict[str, Float[Array, ""]]:
+        """Per-step scalars m = h(s) for the log.
+
+        Returns:
+            Each in the unit that its name ends with ([m], [rad], [m/s]), else [1].
+
+        Source:
+            Ours; each task names its own.
+        """
+
     def episode_measures(
-        self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
+        self, recorded: Mapping[str, Shaped[Array, "T ..."]], counts: Bool[Array, " T"]
     ) -> dict[str, Float[Array, ""]]:
-        """Those of every task suffice."""
+        """The task's own measures of a whole episode, m = h(s_1 … s_T): none.
+
+        Args:
+            recorded: signals over the control steps T by name, those of
+                `scene_signals` and what evaluations record of every task, such as
+                `joint_pos`, `palm_pos_w`, `palm_quat_w`, `failed`.
+            counts: the steps that count, up to the end of the episode.
+
+        Returns:
+            By name, with the unit at its end ([s], [rad], [m]); NaN where undefined.
+
+        Source:
+            Ours; each task names its own.
+        """
         del recorded, counts
         return {}

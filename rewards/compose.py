@@ -41,7 +41,17 @@ RewardTable = tuple[RewardTerm, ...]
 
 
 def precomputed(magnitude: Float[Array, ""]) -> Float[Array, ""]:
-    """Kernel of a term whose magnitude a stateful step has already computed."""
+    """Kernel of a term whose magnitude a stateful step has already computed, m = m.
+
+    Args:
+        magnitude: m, in the unit of that step ([m/s], [s], [1]).
+
+    Returns:
+        The same number.
+
+    Source:
+        Ours.
+    """
     return magnitude
 
 
@@ -71,14 +81,18 @@ def table_weights(
 def weights_at(
     weights: Mapping[str, Schedule], steps: Steps
 ) -> dict[str, Float[Array, ""]]:
-    """Values of all weights after `steps` control steps of this environment.
+    """Values of all weights after n control steps of this environment, w ← w(n).
 
     Args:
         weights: schedules by row name, as from `table_weights`.
-        steps: control steps completed since training began, ≥ 0.
+        steps: n, control steps completed since training began, ≥ 0.
 
     Returns:
-        One number per row.
+        One number per row; its unit is that of 1/(magnitude · s), so that terms
+            are [1].
+
+    Source:
+        Ours; the schedules are the paper's.
     """
     return {name: schedule(steps) for name, schedule in weights.items()}
 
@@ -106,6 +120,9 @@ def evaluate(
     Raises:
         ValueError: rows share a name, a row binds a signal that is not there, or the
             names of `weights` are not those of the rows.
+
+    Source:
+        Isaac Lab, whose reward manager also multiplies by Δt; the order is ours.
     """
     _check_rows(table, weights)
     named = signals if isinstance(signals, Mapping) else vars(signals)

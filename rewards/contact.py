@@ -11,7 +11,7 @@ def undesired_contact(link_contact: Float[Array, " links"]) -> Float[Array, ""]:
     """Number of links other than fingertips that touch the ground, Σ c.
 
     Args:
-        link_contact: 1 for each link in contact, else 0.
+        link_contact: c, 1 for each link in contact, else 0 [1].
 
     Returns:
         Magnitude, a count in [0, links].

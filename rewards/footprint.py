@@ -51,7 +51,7 @@ def init_footprint_memory(tips: int = 5) -> FootprintMemory:
 def footprint_step(
     memory: FootprintMemory, tip_pos_v: Float[Array, "tips 3"]
 ) -> FootprintMemory:
-    """Captures the targets at the first call and keeps them ever after.
+    """Captures the targets at the first call and keeps them, p* ← p once, then p*.
 
     Call it before `footprint_departure` in each reward evaluation, and do not reset the
     memory with the episode. The magnitude of the very first evaluation is then 0.

@@ -14,7 +14,7 @@ DEAD_SPEED_MPS = 0.02
 def in_contact(
     tip_force_n: Float[Array, " tips"], force_threshold_n: Scalar
 ) -> Bool[Array, " tips"]:
-    """Contact of each tip, F ≥ F_th; a tip is airborne exactly when this is false.
+    """Contact of each tip, c = [F ≥ F_th]; a tip is airborne exactly when c = 0.
 
     Args:
         tip_force_n: magnitude of the ground contact force [N].
@@ -22,6 +22,9 @@ def in_contact(
 
     Returns:
         One flag per tip.
+
+    Source:
+        Paper, "Auxiliary lift objective".
     """
     return tip_force_n >= force_threshold_n
 
@@ -29,7 +32,7 @@ def in_contact(
 def is_commanded(
     command_planar: Float[Array, "2"], dead_speed_mps: Scalar
 ) -> Bool[Array, ""]:
-    """Whether the command asks for planar motion, |v_cmd| ≥ v_dead.
+    """Whether the command asks for planar motion, c = [‖v_cmd‖ ≥ v_dead].
 
     Args:
         command_planar: commanded planar velocity [m/s]; its direction does not matter.
@@ -37,5 +40,8 @@ def is_commanded(
 
     Returns:
         One flag.
+
+    Source:
+        Paper, "Auxiliary lift objective".
     """
     return safe_norm(command_planar) >= dead_speed_mps

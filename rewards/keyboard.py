@@ -7,7 +7,7 @@ from rewards.gates import FORCE_THRESHOLD_N, in_contact
 from rewards.shaping import Scalar, safe_norm
 
 APPROACH_WIDTH_M = 0.01
-"""Distance at which half of the approach penalty is left [m]; ours."""
+"""Distance at which the approach penalty has fallen to half [m]; ours."""
 
 
 def fingertip_distance(
@@ -15,13 +15,13 @@ def fingertip_distance(
     asked: Float[Array, ""],
     width_m: Scalar = APPROACH_WIDTH_M,
 ) -> Float[Array, ""]:
-    """Distance d of the fingertip from where it should be, a d/(d + w).
+    """Distance d = ‖e‖ of the fingertip from where it should be, a d/(d + w).
 
     Its slope is largest where the tip is nearly there, and it never exceeds 1, so that
     a far tip costs no more than a pending request may.
 
     Args:
-        offset_m: from the tip to its goal [m].
+        offset_m: e, from the tip to its goal [m].
         asked: a, 1 while the goal counts, else 0.
         width_m: w [m].
 
@@ -40,12 +40,12 @@ def requested_depth(
     actuation_m: Float[Array, " keys"],
     requested: Float[Array, " keys"],
 ) -> Float[Array, ""]:
-    """How far the requested key is on its way to actuation, clip(d/d_a, 0, 1).
+    """How far the requested key is on its way to actuation, Σ r clip(d/d_a, 0, 1).
 
     Args:
         depth_m: travel d of each key [m].
         actuation_m: actuation depth d_a of each key [m].
-        requested: 1 at the requested key, zeros without a request.
+        requested: r, 1 at the requested key, zeros without a request.
 
     Returns:
         Magnitude in [0, 1].
@@ -61,12 +61,12 @@ def other_depth(
     actuation_m: Float[Array, " keys"],
     requested: Float[Array, " keys"],
 ) -> Float[Array, ""]:
-    """The same of all keys that are not requested, Σ clip(d/d_a, 0, 1).
+    """The same of all keys that are not requested, Σ (1 − r) clip(d/d_a, 0, 1).
 
     Args:
         depth_m: travel d of each key [m].
         actuation_m: actuation depth d_a of each key [m].
-        requested: 1 at the requested key, zeros without a request.
+        requested: r, 1 at the requested key, zeros without a request.
 
     Returns:
         Magnitude in [0, keys].
@@ -82,7 +82,7 @@ def support_contact(
     support_force_n: Float[Array, " tips"],
     force_threshold_n: Scalar = FORCE_THRESHOLD_N,
 ) -> Float[Array, ""]:
-    """Share of the supporting fingertips that stand on the ground.
+    """Share of the supporting fingertips that stand on the ground, Σ_j [F_j ≥ F_th]/n.
 
     Args:
         support_force_n: contact forces of all tips but the pressing one [N].
@@ -98,10 +98,11 @@ def support_contact(
 
 
 def keys_touched(touched: Bool[Array, " keys"]) -> Float[Array, ""]:
-    """Number of keys that another part of the hand touches.
+    """Number of keys that another part of the hand touches, Σ_k c_k.
 
     Args:
-        touched: for each key, whether something but the pressing fingertip touches it.
+        touched: c, for each key, whether something but the pressing fingertip touches
+            it [1].
 
     Returns:
         Magnitude, a count in [0, keys].
@@ -115,11 +116,11 @@ def keys_touched(touched: Bool[Array, " keys"]) -> Float[Array, ""]:
 def support_drift(
     support_pos_w: Float[Array, "tips 2"], support_start_w: Float[Array, "tips 2"]
 ) -> Float[Array, ""]:
-    """Mean distance of the supporting tips from where they first stood.
+    """Mean distance of the supporting tips from where they first stood, Σ ‖p − s‖/n.
 
     Args:
-        support_pos_w: places of the supporting tips on the ground [m].
-        support_start_w: the same at the episode's start [m].
+        support_pos_w: places p of the supporting tips on the ground [m].
+        support_start_w: s, the same at the episode's start [m].
 
     Returns:
         Magnitude [m], ≥ 0.

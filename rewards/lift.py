@@ -70,7 +70,9 @@ def init_lift_memory(tips: int = 5) -> LiftMemory:
 def lift_frequency_hz(
     speed_mps: Float[Array, ""], params: LiftParams
 ) -> Float[Array, ""]:
-    """Stepping frequency f, linear in the commanded speed and clamped at both ends.
+    """Stepping frequency, linear in the commanded speed and clamped at both ends.
+
+    f = f_low + clip((|v_cmd| − v_low)/(v_high − v_low), 0, 1) (f_high − f_low).
 
     Args:
         speed_mps: commanded planar speed |v_cmd| [m/s], ≥ 0.

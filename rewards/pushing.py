@@ -34,7 +34,7 @@ def object_reached(
 
 
 def object_progress(progress_mps: Float[Array, ""]) -> Float[Array, ""]:
-    """Speed at which the object nears its target, max(0, −ḋ).
+    """Speed at which the object nears its target, m = max(0, −ḋ).
 
     With `object_regress` at the opposite weight, the sum over an episode is that of a
     potential: what is gained by a distance is lost by going back.
@@ -52,7 +52,7 @@ def object_progress(progress_mps: Float[Array, ""]) -> Float[Array, ""]:
 
 
 def object_regress(progress_mps: Float[Array, ""]) -> Float[Array, ""]:
-    """Speed at which the object moves away from its target, max(0, ḋ).
+    """Speed at which the object moves away from its target, m = max(0, ḋ).
 
     Args:
         progress_mps: −ḋ, the decrease of the distance over the control step [m/s].
@@ -85,10 +85,10 @@ def object_at_target(
 
 
 def object_delivered(target_error_m: Float[Array, ""]) -> Float[Array, ""]:
-    """1 while the object is within 2 cm of its target, else 0.
+    """1 while the object is within 2 cm of its target, else 0: m = [d < 2 cm].
 
     Args:
-        target_error_m: planar distance [m].
+        target_error_m: planar distance d [m].
 
     Returns:
         Magnitude, 0 or 1.

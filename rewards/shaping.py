@@ -17,10 +17,13 @@ def safe_norm(x: Float[Array, "*n d"]) -> Float[Array, "*n"]:
     the root is taken, not after: a `where` around the root alone still gives NaN.
 
     Args:
-        x: vectors, any unit.
+        x: vectors of any unit, such as [m/s].
 
     Returns:
         Norms in the unit of `x`, ≥ 0; NaN where `x` has one.
+
+    Source:
+        The "double where" of JAX's FAQ, "Gradients contain NaN where using where".
     """
     squared = jnp.sum(jnp.square(x), axis=-1)
     zero = squared == 0.0
@@ -55,7 +58,7 @@ def tracking_kernel(error: Float[Array, " d"], width: Scalar) -> Float[Array, ""
     was trained: w² divides without a factor 2, so the kernel falls to 1/e at |e| = w.
 
     Args:
-        error: difference between commanded and actual quantity.
+        error: e, difference between commanded and actual quantity, any unit ([m/s]).
         width: w > 0, in the unit of `error`.
 
     Returns:

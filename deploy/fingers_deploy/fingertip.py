@@ -31,7 +31,7 @@ _TIP: Vector = (-0.00105, 0.0002, 0.0215)
 def pressing_fingertip(joint_pos: ArrayLike, v_quat_b: ArrayLike) -> Array:
     """Centre of the pressing fingertip relative to the palm's origin, in V [m], [3].
 
-    Training uses the same formula (`envs.tasks.keyboard.fingertip`).
+    Training uses the same formula (`envs.tasks.keyboard.stance`).
 
     Args:
         joint_pos: measured joint angles [rad], [20].

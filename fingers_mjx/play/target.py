@@ -5,15 +5,16 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from jaxtyping import Float
 
-from envs.tasks.push.measures import ENTER_M, STAY_M
+from envs.tasks.push.measures import STAY_M
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import Line, draw
 from fingers_mjx.pictures.video import Frame
 from fingers_mjx.play.player import Played
+from rewards.pushing import DELIVERED_M
 
 Target = Float[np.ndarray, "2"] | None
 _ABOVE_FLOOR_M = 0.001
-_RINGS = ((ENTER_M, (200, 60, 30)), (STAY_M, (120, 120, 120)))
+_RINGS = ((DELIVERED_M, (200, 60, 30)), (STAY_M, (120, 120, 120)))
 
 
 def target_of(played: Played) -> Target:

@@ -82,7 +82,7 @@ def test_worlds_are_different_from_each_other(task):
         assert len(np.unique(np.asarray(x), axis=0)) == task.batch.num_envs
 
 
-def test_ends_are_told_apart(task, rollout):
+def test_ends_are_distinguished(task, rollout):
     for state in rollout:
         info = state.info
         flags = (state.done, info["truncation"], info["invalid"])

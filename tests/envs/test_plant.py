@@ -9,7 +9,8 @@ from envs.errors import InputError
 from envs.physics import PhysicsOutput
 from envs.physics.room import ROOM
 from envs.plant import check_interval
-from envs.tasks.crawl import CrawlConfig, CrawlEnv
+from envs.registry import make_env
+from envs.tasks.crawl import CrawlConfig
 
 
 class TooSmall:
@@ -25,7 +26,7 @@ class TooSmall:
 
 
 @pytest.mark.parametrize(
-    ("bits", "told"),
+    ("bits", "reported"),
     [
         (4, {"contact_overflow"}),  # OverflowType.BROADPHASE
         (8 | 16, {"contact_overflow"}),
@@ -34,9 +35,9 @@ class TooSmall:
         (1 | 8, {"contact_overflow", "constraint_overflow"}),
     ],
 )
-def test_dropped_contacts_are_told_by_the_environment(bits, told):
+def test_dropped_contacts_are_reported_by_the_environment(bits, reported):
     """T9: Warp's overflow bits become metrics of the step, also of an invalid one."""
-    env = CrawlEnv()
+    env = make_env("crawl")
     physics = TooSmall(env.plant.physics, bits)
     env.plant = dataclasses.replace(env.plant, physics=physics)
     state = jax.vmap(env.reset)(jax.random.split(jax.random.key(0), 4))
@@ -47,7 +48,7 @@ def test_dropped_contacts_are_told_by_the_environment(bits, told):
     state = state.replace(data=state.data.replace(qpos=qpos, qvel=qvel))
     after = jax.jit(jax.vmap(env.step))(state, jnp.zeros((4, 20)))
     for name in ROOM:
-        hit = [0, 1, 0, 1] if name in told else 0
+        hit = [0, 1, 0, 1] if name in reported else 0
         np.testing.assert_array_equal(after.metrics[name], hit)
     np.testing.assert_array_equal(after.info["invalid"], [0, 0, 1, 1])
 
@@ -63,7 +64,11 @@ def test_room_for_contacts_is_a_setting(monkeypatch):
 
     make_physics = hand_env.make_physics
     monkeypatch.setattr(hand_env, "make_physics", spy)
-    CrawlEnv(CrawlConfig(contacts_per_world=7, constraints_per_world=9), num_worlds=5)
+    make_env(
+        "crawl",
+        CrawlConfig(contacts_per_world=7, constraints_per_world=9),
+        num_worlds=5,
+    )
     assert given == {
         "contacts_per_world": 7,
         "constraints_per_world": 9,
@@ -74,7 +79,7 @@ def test_room_for_contacts_is_a_setting(monkeypatch):
 
 @pytest.fixture(scope="module")
 def plant():
-    return CrawlEnv().plant
+    return make_env("crawl").plant
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

@@ -20,9 +20,10 @@ from envs.hand.hand_file import (
     save_hand_file,
 )
 from envs.randomize import RandomizeConfig
-from envs.tasks.crawl import CrawlConfig, CrawlEnv
+from envs.registry import make_env
+from envs.tasks.crawl import CrawlConfig
 
-ENV = CrawlEnv()
+ENV = make_env("crawl")
 HAND = load_hand_file()
 JOINTS = figures().joint_names
 ANY = arrays(np.float32, 20, elements=st.floats(width=32))

@@ -3,7 +3,7 @@ import pytest
 from envs import registry
 from envs.errors import InputError
 from envs.registry import Task, get_task, make_batch, register, task_names
-from envs.tasks.crawl import CrawlConfig, CrawlEnv
+from envs.tasks.crawl import Crawl, CrawlConfig
 
 
 def test_unknown_task_is_named_with_the_nearest():
@@ -15,12 +15,12 @@ def test_unknown_task_is_named_with_the_nearest():
 
 def test_a_task_from_outside_joins_and_cannot_replace_another(monkeypatch):
     monkeypatch.setattr(registry, "_TASKS", dict(registry._TASKS))
-    register("creep", Task(lambda: CrawlConfig(action_scale_rad=0.01), CrawlEnv))
+    register("creep", Task(lambda: CrawlConfig(action_scale_rad=0.01), Crawl.on))
     assert task_names()[-1] == "creep"
     env = make_batch("creep", 3, auto_reset=False)
     assert (env.num_envs, env.config.action_scale_rad) == (3, 0.01)
     with pytest.raises(ValueError, match="'creep' is registered already"):
-        register("creep", Task(CrawlConfig, CrawlEnv))
+        register("creep", Task(CrawlConfig, Crawl.on))
 
 
 def test_configurations_are_fresh():

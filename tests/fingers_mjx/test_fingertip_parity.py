@@ -5,8 +5,7 @@ import numpy as np
 
 from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
-from envs.tasks.keyboard.fingertip import JOINTS, fingertip_v
-from envs.tasks.keyboard.stance import keyboard_stance
+from envs.tasks.keyboard.stance import JOINTS, fingertip_v, keyboard_stance
 from fingers_deploy.fingertip import FIRST_JOINT, pressing_fingertip
 
 

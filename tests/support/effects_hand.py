@@ -9,8 +9,9 @@ import numpy as np
 from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import Effect, Quantity, load_hand_file
 from envs.randomize import model_fields, no_randomization
+from envs.registry import make_env
 from envs.sensing import imu_of
-from envs.tasks.crawl import CrawlConfig, CrawlEnv
+from envs.tasks.crawl import CrawlConfig
 
 CALM = CrawlConfig(randomize=no_randomization(0.88))
 IN_HAND = tuple(name for name in CATALOGUE if name != "mount_tilt")
@@ -30,7 +31,9 @@ def hand_with(*effects):
 
 
 def env_with(*effects, config=CALM, backend="cpu"):
-    return CrawlEnv(config, backend, hand=hand_with(*effects) if effects else None)
+    return make_env(
+        "crawl", config, backend, hand=hand_with(*effects) if effects else None
+    )
 
 
 def full_env(backend="cpu"):

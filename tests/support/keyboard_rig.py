@@ -13,7 +13,6 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HAND_NQ, TIP_LINKS
 from envs.scene import build_scene
-from envs.tasks.keyboard.fingertip import JOINTS
 from envs.tasks.keyboard.model import (
     ACTUATION_M,
     ARROWS,
@@ -23,8 +22,14 @@ from envs.tasks.keyboard.model import (
     add_keyboard,
     free_fingertip,
 )
-from envs.tasks.keyboard.stance import FINGER, FINGER_INDEX, PLACEMENT, keyboard_stance
-from envs.tasks.keyboard.task import KeyboardConfig
+from envs.tasks.keyboard.settings import KeyboardConfig
+from envs.tasks.keyboard.stance import (
+    FINGER,
+    FINGER_INDEX,
+    JOINTS,
+    PLACEMENT,
+    keyboard_stance,
+)
 from fingers_robot.simulator.command_path import CommandPath
 
 TIP_RADIUS_M, LIFT_M = 0.0075, 0.010

@@ -8,11 +8,9 @@ from dataclasses import dataclass, field
 import jax.numpy as jnp
 
 from envs.commands import CommandConfig
-from envs.env import HandEnv
 from envs.registry import Task, register
-from envs.settings import HandSettings
-from envs.task import BareTask
-from envs.tasks.start import near_stance
+from envs.task import HandSettings, HandTask
+from envs.tasks.upright import near_stance
 from rewards import RewardTerm, action_rate, stance_height
 
 CROUCH = (
@@ -28,12 +26,9 @@ class CrouchConfig(HandSettings):
 
 
 @dataclass(frozen=True)
-class Crouch(BareTask):
+class Crouch(HandTask):
     config: CrouchConfig
     table: tuple = CROUCH
-
-    def begin_world(self):
-        return {}
 
     def begin_episode(self, key, world, state):
         return {"command": jnp.zeros(3)}
@@ -48,16 +43,9 @@ class Crouch(BareTask):
     def terminated(self, signals):
         return signals.palm_contact > 0
 
-    def advance(self, memory, signals):
-        return memory
-
     def measures(self, signals):
         return {"height_m": signals.palm_pos_w[2]}
 
 
-def make(config, **options):
-    return HandEnv(Crouch(config), **options)
-
-
 def register_crouch():
-    register("crouch", Task(CrouchConfig, make))
+    register("crouch", Task(CrouchConfig, Crouch.on))

@@ -3,17 +3,17 @@
 from collections.abc import Mapping
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Bool, Float, Shaped
 
 from envs.tasks.keyboard.model import KEY_NAMES
 
 
 def press_measures(
-    recorded: Mapping[str, Array], counts: Bool[Array, " T"]
+    recorded: Mapping[str, Shaped[Array, "T ..."]], counts: Bool[Array, " T"]
 ) -> dict[str, Float[Array, ""]]:
     """What became of the requests of an episode, and how the hand stood meanwhile.
 
-    `correct_fraction` is hits by decided requests; a request that the end of the
+    `correct_fraction` = hits/(hits + wrong + timeouts); a request that the end of the
     episode cuts off is not decided. Latencies are those of the hits, from the control
     step in which the request is first seen to the end of the one in which the key
     closes (paper: command issue to recorded outcome). `wrong_<key>` counts requests
@@ -24,6 +24,13 @@ def press_measures(
         recorded: signals over T steps, see `Keyboard.scene_signals` in
             `envs.tasks.keyboard.task`.
         counts: the steps that count.
+
+    Returns:
+        Fractions and counts [1], latencies [s], tilt [°], drift [mm]; NaN where nothing
+        was decided.
+
+    Source:
+        Paper, keyboard pressing; stray presses and drift are ours.
     """
     hit, wrong, timeout, stray = (
         recorded[name] * counts for name in ("hit", "wrong", "timeout", "stray")

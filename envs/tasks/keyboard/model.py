@@ -84,15 +84,25 @@ class Placement:
     y_w: float
     yaw_w: float
 
-    def to_world(self, points_m: np.ndarray) -> np.ndarray:
-        """Turns points on the keyboard (right, away) to world x, y (n × 2) [m]."""
+    def to_world(self, points_m: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 2"]:
+        """Points on the keyboard as points on the table, p_w = R(yaw) p + (x, y).
+
+        Args:
+            points_m: right and away from Down's centre [m].
+
+        Returns:
+            x and y in the world [m].
+
+        Source:
+            Ours.
+        """
         cos, sin = np.cos(self.yaw_w), np.sin(self.yaw_w)
         turned = points_m @ np.array([[cos, sin], [-sin, cos]])
         return turned + np.array([self.x_w, self.y_w])
 
 
 def add_keyboard(spec: mujoco.MjSpec, placement: Placement, finger_geom: str) -> None:
-    """Adds the keyboard to a scene, and sensors that tell who touches which key.
+    """Adds the keyboard to a scene, and sensors of who touches which key.
 
     Sensors `touch_<key>` count all contacts of a key, `finger_<key>` those with the
     pressing finger's tip. Palm and payload do not meet the keyboard: a hand that lies
@@ -140,7 +150,8 @@ def key_events(
 ) -> tuple[Bool[Array, " keys"], Bool[Array, " keys"]]:
     """Electrical state of the keys after a step, and which were newly pressed.
 
-    A key closes at its actuation depth and opens `RELEASE_M` above it.
+    A key closes at its actuation depth d_a and opens h = `RELEASE_M` above it:
+    closed ← d > d_a − h if closed, else d ≥ d_a.
 
     Args:
         down: closed before the step.
@@ -149,6 +160,9 @@ def key_events(
 
     Returns:
         Closed after the step, and the key-down events of the step.
+
+    Source:
+        CHERRY, data sheet "MX Series" (actuation); the hysteresis is ours.
     """
     closed = jnp.where(down, depth_m > actuation_m - RELEASE_M, depth_m >= actuation_m)
     return closed, closed & ~down
@@ -165,6 +179,9 @@ def key_spring(
     Args:
         force_n: F_a at the actuation depth [N].
         actuation_m: d_a [m].
+
+    Source:
+        CHERRY, data sheet "MX Series" (F_a and d_a); the share s is ours.
     """
     stiffness = (1.0 - REST_SHARE) * force_n / actuation_m
     return stiffness, -actuation_m * REST_SHARE / (1.0 - REST_SHARE)

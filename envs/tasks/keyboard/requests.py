@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import flax.struct
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
 from envs.errors import InputError, check_ordered
 from envs.streams import stream
@@ -73,7 +73,7 @@ class Outcome:
     stray: Float[Array, "*b"]
 
 
-def begin_requests(key: Array, config: RequestConfig, dt_s: float) -> Requests:
+def begin_requests(key: PRNGKeyArray, config: RequestConfig, dt_s: float) -> Requests:
     """An episode begins with a gap or, as often, with a request.
 
     Were there only gaps at first, the first iteration of a training would see inputs
@@ -88,7 +88,11 @@ def begin_requests(key: Array, config: RequestConfig, dt_s: float) -> Requests:
 
 
 def one_hot(requests: Requests) -> Float[Array, "4"]:
-    """The policy's input: 1 at the requested key, zeros in a gap (paper)."""
+    """The policy's input, r_k = [k = requested key]; zeros in a gap [1].
+
+    Source:
+        Paper, keyboard pressing.
+    """
     return (jnp.arange(len(ARROWS)) == requests.key).astype(jnp.float32)
 
 
@@ -98,16 +102,21 @@ def judge(
     config: RequestConfig,
     dt_s: float,
 ) -> Outcome:
-    """Says what a step's key events mean.
+    """Outcome of a step in which n keys go down, at time t of a request.
 
-    Where two keys go down in one step and one of them is the requested key, the press
-    is wrong: which came first is not known (ours).
+    hit = [n = 1 ∧ it is the requested key], wrong = [n > 0 ∧ ¬hit],
+    timeout = [n = 0 ∧ t ≥ T]; in a gap all are 0 and the n events are stray. Where two
+    keys go down in one step and one of them is the requested key, the press is wrong:
+    which came first is not known (ours).
 
     Args:
         requests: the request during the step.
         pressed: key-down events of the step.
         config: times.
         dt_s: control interval [s].
+
+    Source:
+        Paper, keyboard pressing (first key event or time-out decides).
     """
     asked = requests.key != IDLE
     count = jnp.sum(pressed)
@@ -125,13 +134,13 @@ def judge(
 
 
 def next_request(
-    key: Array,
+    key: PRNGKeyArray,
     requests: Requests,
     ended: Bool[Array, ""],
     config: RequestConfig,
     dt_s: float,
 ) -> Requests:
-    """The request of the next step.
+    """The request of the next step, k ← drawn key at the end of a gap, else k or none.
 
     Args:
         key: of this step's draws.
@@ -139,6 +148,9 @@ def next_request(
         ended: whether the step decided it.
         config: times.
         dt_s: control interval [s].
+
+    Source:
+        Paper, keyboard pressing; the length of the gap is ours.
     """
     idle = requests.key == IDLE
     begins = idle & (requests.steps + 1 >= requests.gap_steps)
@@ -163,11 +175,11 @@ def check_requests(config: RequestConfig, dt_s: float) -> None:
         raise InputError("configuration", "requests.idle_s", found, valid)
 
 
-def _draw_key(key: Array) -> Int[Array, ""]:
+def _draw_key(key: PRNGKeyArray) -> Int[Array, ""]:
     return jax.random.randint(stream(key, "request"), (), 0, len(ARROWS))
 
 
-def _gap_steps(key: Array, config: RequestConfig, dt_s: float) -> Int[Array, ""]:
+def _gap_steps(key: PRNGKeyArray, config: RequestConfig, dt_s: float) -> Int[Array, ""]:
     low, high = config.idle_s
     gap_s = jax.random.uniform(stream(key, "gap"), (), minval=low, maxval=high)
     return jnp.maximum(1, jnp.round(gap_s / dt_s)).astype(jnp.int32)

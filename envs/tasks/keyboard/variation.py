@@ -6,7 +6,7 @@ import flax.struct
 import jax
 import jax.numpy as jnp
 import mujoco
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.errors import check_ordered
 from envs.physics import ModelFields
@@ -68,14 +68,14 @@ class KeyboardDraw:
     height_m: Float[Array, "*b"]
 
 
-def draw_keyboard(world: Array, config: KeyboardVariation) -> KeyboardDraw:
+def draw_keyboard(key: PRNGKeyArray, config: KeyboardVariation) -> KeyboardDraw:
     """Draws the keyboard of a world.
 
     Args:
-        world: the world's random key.
+        key: the world's random key.
         config: ranges.
     """
-    key, keys = stream(world, "keyboard"), (len(KEY_NAMES),)
+    key, keys = stream(key, "keyboard"), (len(KEY_NAMES),)
     low, high = config.force_scale
     scale = jax.random.uniform(stream(key, "force"), keys, minval=low, maxval=high)
     low, high = config.actuation_m
@@ -99,3 +99,24 @@ def keyboard_fields(
         "body_pos": body_pos.at[board, 2].add(draw.height_m),
     }
     return fields | springs
+
+
+def misalignment(
+    key: PRNGKeyArray, config: KeyboardVariation
+) -> tuple[Float[Array, ""], Float[Array, "2"]]:
+    """Pose error of the hand before the keyboard, uniform ψ ∈ [−b, b], s_i ∈ [−c, c].
+
+    Args:
+        key: of the episode.
+        config: bounds b [°] and c [m].
+
+    Returns:
+        Turn ψ [rad], and shift s along x and y of the world [m].
+
+    Source:
+        Ours; the paper's operator aligns by trial presses.
+    """
+    bound_rad, bound_m = jnp.deg2rad(config.align_deg), config.align_m
+    turn = jax.random.uniform(stream(key, "turn"), (), minval=-1.0)
+    shift = jax.random.uniform(stream(key, "shift"), (2,), minval=-1.0)
+    return bound_rad * turn, bound_m * shift

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 import flax.struct
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from envs.errors import check_ordered
 from envs.streams import stream
@@ -79,7 +79,7 @@ class CameraState:
     phase_s: Float[Array, "*b"]
 
 
-def start_camera(key: Array, config: CameraConfig, truth: Frame) -> CameraState:
+def start_camera(key: PRNGKeyArray, config: CameraConfig, truth: Frame) -> CameraState:
     """A camera that has seen the scene as it is for as long as it looks back.
 
     Args:
@@ -96,7 +96,7 @@ def start_camera(key: Array, config: CameraConfig, truth: Frame) -> CameraState:
 
 
 def step_camera(
-    key: Array, config: CameraConfig, camera: CameraState, truth: Frame
+    key: PRNGKeyArray, config: CameraConfig, camera: CameraState, truth: Frame
 ) -> CameraState:
     """Takes the newest frame up to now, if there is one and it is not lost.
 
@@ -139,8 +139,10 @@ def _between(before: Frame, after: Frame, share: Float[Array, ""]) -> Frame:
     return mixed.replace(heading_rad=before.heading_rad + share * turn)
 
 
-def _noisy(key: Array, config: CameraConfig, seen: Frame) -> Frame:
-    def normal(name: str, shape: tuple[int, ...], deviation: float) -> Array:
+def _noisy(key: PRNGKeyArray, config: CameraConfig, seen: Frame) -> Frame:
+    def normal(
+        name: str, shape: tuple[int, ...], deviation: float
+    ) -> Float[Array, "..."]:
         return deviation * jax.random.normal(stream(key, name), shape)
 
     position_m, heading_rad = config.position_noise_m, config.heading_noise_rad

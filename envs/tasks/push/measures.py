@@ -3,7 +3,8 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
-ENTER_M = 0.02
+from rewards.pushing import DELIVERED_M
+
 STAY_M = 0.05
 DWELL_S = 1.0
 NEAR_M = (0.20, 0.30)
@@ -18,11 +19,13 @@ def push_measures(
 ) -> dict[str, Float[Array, ""]]:
     """Delivery: within 2 cm of the target, then for 1 s within 5 cm.
 
+    delivered = ∃ t: d_t < 2 cm ∧ d_{t+1} … d_{t+n} < 5 cm, n = 1 s/Δt.
+
     Args:
-        error_m: distance of the cube from its target.
-        distance_m: of the target from the cube at the start.
+        error_m: distance d of the cube from its target [m].
+        distance_m: of the target from the cube at the start [m].
         counts: steps before the end of the episode.
-        dt_s: control interval.
+        dt_s: control interval Δt [s].
 
     Returns:
         `delivered` (0 or 1) and the same for targets up to 20 cm, up to 30 cm and
@@ -34,10 +37,10 @@ def push_measures(
         Paper, object pushing.
     """
     dwell = round(DWELL_S / dt_s)
-    entered = (error_m < ENTER_M) & counts
-    left = ~((error_m < STAY_M) & counts)
+    entered = (error_m < DELIVERED_M) & counts
+    strayed = ~((error_m < STAY_M) & counts)
     # Steps with a departure within the dwell that follows them.
-    departures = jnp.cumsum(left)
+    departures = jnp.cumsum(strayed)
     padded = jnp.append(departures, jnp.full(dwell, departures[-1] + 1))
     stays = padded[dwell : dwell + len(error_m)] == departures
     done = entered & stays
@@ -46,7 +49,9 @@ def push_measures(
     near, far = distance < NEAR_M[0], distance >= NEAR_M[1]
     last = jnp.maximum(jnp.sum(counts) - 1, 0)
 
-    def where(condition: Array, value: Array) -> Array:
+    def where(
+        condition: Bool[Array, ""], value: Float[Array, ""] | Bool[Array, ""]
+    ) -> Float[Array, ""]:
         return jnp.where(condition, value.astype(jnp.float32), jnp.nan)
 
     return {

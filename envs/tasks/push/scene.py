@@ -3,7 +3,7 @@
 import jax
 import jax.numpy as jnp
 import mujoco
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.hand.spec import HAND_NQ, HAND_NV
 from envs.physics import PhysicsState
@@ -14,9 +14,8 @@ CUBE = "cube"
 HALF_M = 0.020
 MASS_KG = 0.0414
 POS = slice(HAND_NQ, HAND_NQ + 3)
-QUAT = slice(HAND_NQ + 3, HAND_NQ + 7)
 VEL = slice(HAND_NV, HAND_NV + 3)
-"""Where position, orientation and velocity of the cube stand in `PhysicsState`."""
+"""Where position and velocity of the cube stand in `PhysicsState`."""
 
 _AWAY_M = 0.5
 _COLOUR = (0.35, 0.55, 0.30, 1.0)
@@ -47,14 +46,17 @@ def add_cube(spec: mujoco.MjSpec, friction: float) -> None:
 
 
 def place_cube(
-    key: Array, state: PhysicsState, pos_w: Float[Array, "2"]
+    key: PRNGKeyArray, state: PhysicsState, pos_w: Float[Array, "2"]
 ) -> PhysicsState:
-    """Puts the cube on the floor at rest, turned at random.
+    """Puts the cube on the floor at rest, turned by a uniform ψ ∈ [0, π/2].
 
     Args:
         key: of the episode.
         state: of the scene.
         pos_w: where, on the floor [m].
+
+    Source:
+        Ours.
     """
     turn = jax.random.uniform(stream(key, "cube_turn"), (), maxval=jnp.pi / 2)
     pose = jnp.concatenate([pos_w, jnp.array([HALF_M]), about_z(turn)])

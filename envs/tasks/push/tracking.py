@@ -49,18 +49,25 @@ def track_inputs(
 ) -> dict[str, Float[Array, "3"]]:
     """Object position, velocity and way to the target in V.
 
-    The velocity is (p − s)/τ, which for a steady motion is the velocity itself, with
-    noise of about σ/τ. V's tilt is that of the IMU, its heading that of the camera.
+    The velocity is v = (p − s)/τ, which for a steady motion is the velocity itself,
+    with noise of about σ/τ. V's tilt is that of the IMU, its heading that of the
+    camera.
 
     Args:
         track: what is known.
         target_pos_w: the target [m].
-        gravity_v: unit vector of gravity in V, as the IMU tells it.
+        gravity_v: unit vector of gravity in V, as the IMU measures it.
+
+    Returns:
+        `object_pos` [m], `object_vel` [m/s], `object_to_target` [m].
+
+    Source:
+        Paper, object pushing; the velocity filter is ours.
     """
     frame = track.frame
     vel_w = (frame.object_pos_w - track.slow_pos_w) / VELOCITY_TIME_S
 
-    def in_v(vector_w: Array) -> Array:
+    def in_v(vector_w: Float[Array, "3"]) -> Float[Array, "3"]:
         return to_v(vector_w, frame.heading_rad, gravity_v)
 
     return {
@@ -77,10 +84,16 @@ def to_v(
 ) -> Float[Array, "3"]:
     """World components of a vector as components in V.
 
+    x_V = (x cos ψ + y sin ψ) a + (y cos ψ − x sin ψ) (u × a) + z u, with u = −g up and
+    a the part of V's x axis across u, of length 1.
+
     Args:
-        vector_w: the vector.
-        heading_rad: angle about the vertical of V's x axis, seen from above.
-        gravity_v: unit vector of gravity in V.
+        vector_w: the vector, of any unit, which is that of the result.
+        heading_rad: ψ, angle about the vertical of V's x axis, seen from above [rad].
+        gravity_v: g, unit vector of gravity in V.
+
+    Source:
+        Ours.
     """
     up = -gravity_v
     ahead = jnp.array([1.0, 0.0, 0.0]) - up[0] * up

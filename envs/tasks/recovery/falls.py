@@ -14,6 +14,7 @@ from importlib.resources import files
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
@@ -73,16 +74,6 @@ def falls_of(hand: HandFile, stance: Stance) -> Falls:
     return stored if hand.sha256 == stored.hand_sha256 else settle_falls(hand, stance)
 
 
-def falls_json(falls: Falls) -> str:
-    """The contents of `falls.json`, one pose a line."""
-    parts = {k: json.dumps(v) for k, v in vars(falls).items()}
-    for name in ("qpos", "target_rad"):
-        rows = ",\n  ".join(json.dumps(row) for row in getattr(falls, name))
-        parts[name] = f"[\n  {rows}\n ]"
-    body = ",\n ".join(f"{json.dumps(k)}: {v}" for k, v in parts.items())
-    return f"{{\n {body}\n}}\n"
-
-
 def settle_falls(hand: HandFile, stance: Stance) -> Falls:
     """Settles `POSES_PER_SIDE` poses on each side; deterministic.
 
@@ -99,12 +90,18 @@ def settle_falls(hand: HandFile, stance: Stance) -> Falls:
     return Falls(sides, qpos, targets, hand.sha256)
 
 
-def clearance_m(model: mujoco.MjModel, qpos: np.ndarray) -> float:
-    """Least distance of the hand to the floor [m]; below 0 it reaches into it.
+def clearance_m(model: mujoco.MjModel, qpos: Float[np.ndarray, "27"]) -> float:
+    """Least distance of the hand to the floor, d = min over geoms.
 
     Args:
         model: the scene.
-        qpos: generalized position (27).
+        qpos: generalized position [m, rad].
+
+    Returns:
+        Distance [m]; below 0 the hand reaches into the floor.
+
+    Source:
+        Ours, by MuJoCo's `mj_geomDistance`.
     """
     data = mujoco.MjData(model)
     data.qpos[:] = qpos
@@ -116,8 +113,18 @@ def clearance_m(model: mujoco.MjModel, qpos: np.ndarray) -> float:
     )
 
 
-def down_b(qpos: np.ndarray) -> np.ndarray:
-    """Direction of gravity in the palm frame (3)."""
+def down_b(qpos: Float[np.ndarray, "27"]) -> Float[np.ndarray, "3"]:
+    """Direction of gravity in the palm frame, g = q* ⊗ (0, 0, −1) ⊗ q.
+
+    Args:
+        qpos: generalized position [m, rad], with the orientation q of the palm.
+
+    Returns:
+        Unit vector [1].
+
+    Source:
+        As `envs.signals.gravity`, in float64.
+    """
     down = np.zeros(3)
     mujoco.mju_rotVecQuat(
         down, np.array([0.0, 0.0, -1.0]), qpos[3:7] * np.array([1, -1, -1, -1])
@@ -140,25 +147,55 @@ def _poses(model: mujoco.MjModel, stance: Stance, side: str) -> list[tuple]:
     raise InputError("falls", f"{side} side", found, f"{POSES_PER_SIDE} that rest")
 
 
-def _draw_curl(rng: np.random.Generator, model: mujoco.MjModel) -> np.ndarray:
+def _draw_curl(
+    rng: np.random.Generator, model: mujoco.MjModel
+) -> Float[np.ndarray, "20"]:
     fingers = [rng.uniform(*_THUMB_CURL), *rng.uniform(*_FINGER_CURL, size=(4, 4))]
     return np.clip(np.concatenate(fingers), *model.jnt_range[1:].T)
 
 
-def _draw_lean(rng: np.random.Generator, side: str) -> np.ndarray:
+def _draw_lean(rng: np.random.Generator, side: str) -> Float[np.ndarray, "4"]:
     """Orientation w x y z that turns the side, with some lean, downward."""
     return turned_down(np.add(SIDES[side], rng.uniform(-_LEAN, _LEAN, 3)))
 
 
-def turned_down(axis: np.ndarray) -> np.ndarray:
-    """Orientation w x y z in which a direction in the palm frame points down."""
+def turned_down(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
+    """Orientation in which a direction a in the palm frame points down.
+
+    q = (1 − a_z, −a_y, a_x, 0)/‖·‖, the shortest turn of a to −z; a is not +z.
+
+    Args:
+        axis: a, of any length > 0 [1].
+
+    Returns:
+        Unit quaternion w x y z [1].
+
+    Source:
+        The half-way construction: 1 + a·b beside a × b, with b = −z.
+    """
     x, y, z = axis / np.linalg.norm(axis)
     quat = np.array([1.0 - z, -y, x, 0.0])
     return quat / np.linalg.norm(quat)
 
 
-def curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarray:
-    """Joint angles after the fingers have curled from the stance, without weight."""
+def curl(
+    model: mujoco.MjModel, stance: Stance, target: Float[np.ndarray, "20"]
+) -> Float[np.ndarray, "20"]:
+    """Joint angles after the fingers have curled from the stance, without weight.
+
+    The servos follow θ(t) = θ* + (θ_1 − θ*) min(1, 1.5 t/T), T = 1.5 s.
+
+    Args:
+        model: the hand.
+        stance: with its joint targets θ*.
+        target: joint targets θ_1 at the end [rad].
+
+    Returns:
+        Joint angles [rad].
+
+    Source:
+        Paper, fall recovery (fingers curled); the motion is ours.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = stance.qpos
     data.qpos[2] = 1.0
@@ -174,12 +211,28 @@ def curl(model: mujoco.MjModel, stance: Stance, target: np.ndarray) -> np.ndarra
 
 def lie_down(
     model: mujoco.MjModel,
-    joints: np.ndarray,
-    target: np.ndarray,
-    quat: np.ndarray,
+    joints: Float[np.ndarray, "20"],
+    target: Float[np.ndarray, "20"],
+    quat: Float[np.ndarray, "4"],
     duration_s: float = SETTLE_S,
 ) -> mujoco.MjData:
-    """Puts the hand down just above the floor and lets it sink or settle."""
+    """Puts the hand down just above the floor and lets it sink or settle.
+
+    It starts 2 mm above the floor, `clearance_m` = 0.002.
+
+    Args:
+        model: the hand on its floor.
+        joints: joint angles at the start [rad].
+        target: joint targets that are held [rad].
+        quat: orientation at the start, w x y z.
+        duration_s: time that is simulated [s].
+
+    Returns:
+        The state after it, above the world's origin.
+
+    Source:
+        Ours.
+    """
     data = mujoco.MjData(model)
     data.qpos[:] = [0.0, 0.0, 1.0, *quat, *joints]
     data.qpos[2] -= clearance_m(model, data.qpos) - _GAP_M
@@ -197,6 +250,10 @@ def _rests_on(side: str, data: mujoco.MjData) -> bool:
     return bool(still and lowest == side and down @ SIDES[side] > _LEAST_DOWN[side])
 
 
-def rounded(values: np.ndarray) -> tuple[float, ...]:
-    """Numbers as they are stored."""
+def rounded(values: Float[np.ndarray, " n"]) -> tuple[float, ...]:
+    """Numbers as they are stored, x ← ⌊10⁹ x⌉/10⁹, in their unit ([m], [rad]).
+
+    Source:
+        Ours.
+    """
     return tuple(round(float(value), 9) for value in values)

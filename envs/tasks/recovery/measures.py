@@ -4,7 +4,7 @@ import math
 from collections.abc import Mapping
 
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Num
+from jaxtyping import Array, Bool, Float, Num, Shaped
 
 from envs.tasks.recovery.falls import SIDES
 from envs.tasks.recovery.settle import UPRIGHT_TILT_DEG
@@ -13,15 +13,17 @@ MAX_TILT_RAD = math.radians(UPRIGHT_TILT_DEG)
 
 
 def recovery_measures(
-    recorded: Mapping[str, Array], counts: Bool[Array, " T"], dt_s: float
+    recorded: Mapping[str, Shaped[Array, "T ..."]],
+    counts: Bool[Array, " T"],
+    dt_s: float,
 ) -> dict[str, Float[Array, ""]]:
     """Measures of one episode, over all falls and again for each side.
 
     `righted` is 1 if the detector fired and the hand is still level (tilt < 10°) when
     the episode ends, `time_to_upright_s` the time at which the detector fired, its
-    0.5 s included, and `final_joint_error_rad` the mean of |q − q*| over the joints at
-    the end. The last two are NaN where the detector did not fire, the last one also
-    where the ramp was not over by the end of the episode.
+    0.5 s included, and `final_joint_error_rad` = Σ_j |q_j − q*_j|/20 at the end. The
+    last two are NaN where the detector did not fire, the last one also where the ramp
+    was not over by the end of the episode.
 
     Args:
         recorded: the signals over the control steps, see `Recovery.scene_signals` in
@@ -46,7 +48,7 @@ def recovery_measures(
 
 
 def _per_side(
-    found: Mapping[str, Array], side: Num[Array, ""]
+    found: Mapping[str, Float[Array, ""]], side: Num[Array, ""]
 ) -> dict[str, Float[Array, ""]]:
     """The same again under the name of the side, NaN for falls on the other."""
     return {

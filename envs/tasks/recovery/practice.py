@@ -16,6 +16,7 @@ from importlib.resources import files
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
@@ -65,12 +66,6 @@ def practice_of(hand: HandFile, stance: Stance) -> Poses:
     return load_practice() if same else settle_practice(hand, stance)
 
 
-def practice_json(poses: Poses) -> str:
-    """The contents of `practice.json`, one pose a line."""
-    rows = ",\n ".join(json.dumps(row) for row in poses)
-    return f"[\n {rows}\n]\n"
-
-
 def settle_practice(hand: HandFile, stance: Stance) -> Poses:
     """Simulates the practice poses; deterministic.
 
@@ -104,8 +99,8 @@ def settle_practice(hand: HandFile, stance: Stance) -> Poses:
 
 def _pose(
     model: mujoco.MjModel,
-    level: np.ndarray,
-    draw: Callable[[], np.ndarray],
+    level: Float[np.ndarray, "3"],
+    draw: Callable[[], Float[np.ndarray, "27"]],
     tilt_rad: float,
 ) -> tuple[float, ...]:
     """Draws until the hand has the tilt and does not reach into the floor."""
@@ -120,7 +115,7 @@ def _pose(
 
 def _sink(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance
-) -> np.ndarray:
+) -> Float[np.ndarray, "27"]:
     share, duration_s = rng.uniform(), _draw_duration_s(rng)
     target = _draw_target(rng, model, stance, share)
     joints, quat = curl(model, stance, target), _draw_lean(rng, stance, share)
@@ -129,13 +124,13 @@ def _sink(
 
 def _tip(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance, falls: Falls
-) -> np.ndarray:
+) -> Float[np.ndarray, "27"]:
     k, share = rng.integers(len(falls.side)), rng.uniform()
     over = (1.0 - share) * down_b(np.array(stance.qpos))
     over = over + share * down_b(np.array(falls.qpos[k]))
-    bent = rng.uniform()
-    target = (1.0 - bent) * _draw_target(rng, model, stance, rng.uniform())
-    target = target + bent * np.array(falls.target_rad[k])
+    share_of_fall = rng.uniform()
+    target = (1.0 - share_of_fall) * _draw_target(rng, model, stance, rng.uniform())
+    target = target + share_of_fall * np.array(falls.target_rad[k])
     joints, duration_s = curl(model, stance, target), _draw_duration_s(rng)
     return lie_down(model, joints, target, turned_down(over), duration_s).qpos
 
@@ -144,18 +139,20 @@ def _draw_duration_s(rng: np.random.Generator) -> float:
     return float(np.exp(rng.uniform(*np.log(_SINKING_S))))
 
 
-def _angle(one: np.ndarray, other: np.ndarray) -> float:
+def _angle(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> float:
     return float(np.arccos(np.clip(one @ other, -1.0, 1.0)))
 
 
 def _draw_target(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance, share: float
-) -> np.ndarray:
+) -> Float[np.ndarray, "20"]:
     away = rng.uniform(-_REACH_RAD, _REACH_RAD, 20)
     return np.clip(np.array(stance.target_rad) + share * away, *model.jnt_range[1:].T)
 
 
-def _draw_lean(rng: np.random.Generator, stance: Stance, share: float) -> np.ndarray:
+def _draw_lean(
+    rng: np.random.Generator, stance: Stance, share: float
+) -> Float[np.ndarray, "4"]:
     """Orientation w x y z near the stance's."""
     turn, quat = np.zeros(4), np.zeros(4)
     axis = rng.normal(size=3)

@@ -15,6 +15,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int
 
 from envs.rotations import unrotate
+from envs.signals import tilt_from_level
 from rewards import safe_norm
 
 UPRIGHT_TILT_DEG = 10.0
@@ -70,17 +71,21 @@ class Settle:
         proposed_rad: Float[Array, "20"],
         steps: Int[Array, ""],
     ) -> tuple[Settling, Float[Array, "20"]]:
-        """One control step.
+        """One control step: θ = policy's target, or θ_0 + (θ* − θ_0)(3s² − 2s³).
 
         Args:
             settling: state after the step before.
-            gravity_b: unit vector of gravity in the palm frame, as the IMU tells it.
-            angvel_b: angular velocity of the palm [rad/s], as the IMU tells it.
+            gravity_b: unit vector of gravity in the palm frame, as the IMU measures it.
+            angvel_b: angular velocity of the palm [rad/s], as the IMU measures it.
             proposed_rad: joint targets that the policy asks for [rad].
             steps: number of this control step in the episode.
 
         Returns:
-            The new state, and the joint targets [rad] of this step.
+            The new state, and the joint targets θ [rad] of this step.
+
+        Source:
+            Paper, fall recovery (upright detector); duration and shape of the ramp are
+            the shim's (`fingers_robot.behaviour.settle`).
         """
         ramped = self._ramp(settling, steps)
         target = jnp.where(settling.begun, ramped, proposed_rad)
@@ -97,7 +102,11 @@ class Settle:
         ), target
 
     def over(self, settling: Settling, steps: Int[Array, ""]) -> Bool[Array, ""]:
-        """Whether the ramp has come to its end in control step `steps`."""
+        """Whether the ramp has come to its end in control step `steps`: s = 1 [1].
+
+        Source:
+            Ours; see `step`.
+        """
         return settling.begun & (self._share(settling, steps) >= 1.0)
 
     def _ramp(self, settling: Settling, steps: Int[Array, ""]) -> Float[Array, "20"]:
@@ -120,21 +129,28 @@ def start_settling(joints: int) -> Settling:
     return Settling(never, never, jnp.zeros(joints))
 
 
-def tilt_rad(
-    q_off: tuple[float, ...], gravity_b: Float[Array, "3"]
-) -> Float[Array, ""]:
-    """Stance-relative tilt θ: angle between V's upward axis and up [rad], in [0, π]."""
-    down = unrotate(jnp.array(q_off), gravity_b)
-    return jnp.arctan2(safe_norm(down[:2]), -down[2])
-
-
 def level_and_calm(
     q_off: tuple[float, ...],
     gravity_b: Float[Array, "3"],
     angvel_b: Float[Array, "3"],
 ) -> Bool[Array, ""]:
-    """Whether the hand is upright in this moment; the detector asks for 0.5 s of it."""
-    level = tilt_rad(q_off, gravity_b) < jnp.deg2rad(UPRIGHT_TILT_DEG)
+    """Whether the hand is upright in this moment, θ < 10° ∧ ‖ω‖ < 4 rad/s.
+
+    The detector asks for 0.5 s of it.
+
+    Args:
+        q_off: rotation from the palm to V, w x y z.
+        gravity_b: unit vector of gravity in the palm frame, from which the tilt θ.
+        angvel_b: angular velocity ω of the palm [rad/s].
+
+    Returns:
+        One flag [1].
+
+    Source:
+        Paper, fall recovery (upright detector).
+    """
+    tilt_rad = tilt_from_level(unrotate(jnp.array(q_off), gravity_b))
+    level = tilt_rad < jnp.deg2rad(UPRIGHT_TILT_DEG)
     return level & (safe_norm(angvel_b) < UPRIGHT_SPEED_RPS)
 
 
@@ -150,7 +166,10 @@ def action_toward(
         target_rad: joint targets before [rad].
         goal_rad: joint targets after [rad].
         action_scale_rad: α [rad].
-        action_clip: c.
+        action_clip: c [1].
+
+    Source:
+        Ours: the inverse of the paper's action, up to its clip.
     """
     most = jnp.tanh(action_clip)
     share = jnp.clip((goal_rad - target_rad) / action_scale_rad, -most, most)

@@ -7,22 +7,19 @@ from typing import Any
 import flax.struct
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, Shaped
 
-from envs.base import State
 from envs.commands import CommandConfig, sample_command
-from envs.env import HandEnv
-from envs.hand.hand_file import HandFile, load_hand_file
-from envs.hand.stance import Stance, stance_of
+from envs.hand.hand_file import HandFile
+from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
-from envs.rotations import about_z, multiply, unrotate
+from envs.rotations import multiply, unrotate
 from envs.scoring import check_weights
-from envs.settings import HandSettings
-from envs.signals import Signals
+from envs.signals import Signals, tilt_from_level
 from envs.streams import stream
-from envs.task import BareTask
+from envs.task import HandSettings, HandTask
 from envs.tasks.recovery.falls import SIDES, Falls, falls_of
 from envs.tasks.recovery.measures import recovery_measures
 from envs.tasks.recovery.practice import Poses, practice_of
@@ -32,8 +29,8 @@ from envs.tasks.recovery.settle import (
     action_toward,
     level_and_calm,
     start_settling,
-    tilt_rad,
 )
+from envs.tasks.upright import random_heading
 from rewards import RECOVERY, RewardTable
 
 
@@ -84,7 +81,7 @@ class RecoveryMemory:
 
 
 @dataclass(frozen=True)
-class Recovery(BareTask):
+class Recovery(HandTask):
     """Fall recovery as `envs.task.HandTask`.
 
     Attributes:
@@ -105,12 +102,16 @@ class Recovery(BareTask):
     practice: Poses = ()
     table: RewardTable = RECOVERY
 
-    def begin_world(self) -> dict[str, Any]:
-        """Nothing outlives an episode."""
-        return {}
+    @classmethod
+    def on(cls, config: RecoveryConfig, hand: HandFile, stance: Stance) -> "Recovery":
+        """The task with the fallen poses of a hand, and practice poses if wanted."""
+        wanted = config.practice_fraction > 0.0 and not config.settle
+        practice = practice_of(hand, stance) if wanted else ()
+        middle_b = hand.nominal.palm.inertial_pos
+        return cls(config, stance, falls_of(hand, stance), middle_b, practice)
 
     def begin_episode(
-        self, key: Array, world: PerWorldState, state: PhysicsState
+        self, key: PRNGKeyArray, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
         """The command of the whole episode, the side of the fall, and no settling."""
         del world, state
@@ -122,18 +123,21 @@ class Recovery(BareTask):
         }
 
     def start(
-        self, key: Array, plant: Plant, world: PerWorldState
+        self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
     ) -> tuple[PhysicsState, Float[Array, "20"]]:
-        """One of the fallen poses at rest, at a random heading.
+        """One of the fallen poses at rest, at a random heading, θ = clip(q, limits).
 
-        The joint targets are the joint angles: the motors were off and are energized
-        where the joints are (paper), so that nothing pushes at first.
+        The joint targets θ are the joint angles q: the motors were off and are
+        energized where the joints are, so that nothing pushes at first.
+
+        Returns:
+            The state, and the joint targets [rad].
+
+        Source:
+            Paper, fall recovery; how far the fingers curl and the hand leans is ours.
         """
-        turn = jax.random.uniform(
-            stream(key, "heading"), (), minval=-jnp.pi, maxval=jnp.pi
-        )
         pose = self._pose(key)
-        quat_w = multiply(about_z(turn), pose[3:7])
+        quat_w = multiply(random_heading(key), pose[3:7])
         qpos = jnp.concatenate([pose[:3], quat_w, pose[7:]])
         rest = jnp.zeros(plant.mj_model.nv)
         target = jnp.clip(pose[7:], *plant.joint_range.T)
@@ -145,19 +149,23 @@ class Recovery(BareTask):
         carried: Mapping[str, Any],
         signals: Signals,
         output: PhysicsOutput,
-    ) -> dict[str, Array]:
+    ) -> dict[str, Shaped[Array, "..."]]:
         """How near the stance the hand is, and how far its recovery has come.
 
-        `tilt_rad_v` [rad] and `joint_error_rad`, the mean of |q − q*| [rad], tell the
-        former; `settling` is 1 once the upright detector has fired, `settled` once the
-        ramp is over, and `fall_side` a position in `SIDES`.
+        Returns:
+            `tilt_rad_v`, the tilt θ, and `joint_error_rad` = mean |q − q*|, both [rad];
+            `settling`, 1 once the upright detector has fired, `settled`, 1 once the
+            ramp is over, and `fall_side`, a position in `SIDES` [1].
+
+        Source:
+            Paper, fall recovery.
         """
         del plant, output
         memory = carried["task"]
         error = jnp.abs(signals.joint_pos - jnp.array(self.stance.joint_pos_rad))
         settled = self.settle.over(memory.settling, carried["steps"])
         return {
-            "tilt_rad_v": tilt_rad(self.stance.q_off, signals.gravity_b),
+            "tilt_rad_v": tilt_from_level(self._gravity_v(signals)),
             "joint_error_rad": jnp.mean(error),
             "settling": memory.settling.begun.astype(jnp.float32),
             "settled": settled.astype(jnp.float32),
@@ -166,8 +174,18 @@ class Recovery(BareTask):
 
     def magnitudes(
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
-    ) -> tuple[Memory, dict[str, Array]]:
-        """What the goals compare: gravity in V, height, and both of the stance."""
+    ) -> tuple[Memory, dict[str, Float[Array, "..."]]]:
+        """What the goals compare: gravity in V, height, and both of the stance.
+
+        With c the palm's centre of mass in its frame, z = p_z − c·g, as g points down.
+
+        Returns:
+            `gravity_v` [1], `height_m` z and `stance_height_m` [m], `stance_joint_pos`
+            [rad].
+
+        Source:
+            Paper, fall recovery (tilt, height, joint pose); the point c is ours.
+        """
         del valid  # no memory of a reward
         up_b = unrotate(jnp.array(self.stance.root_quat_w), jnp.array([0.0, 0.0, 1.0]))
         middle_b = jnp.array(self.palm_middle_b)
@@ -179,20 +197,25 @@ class Recovery(BareTask):
         }
 
     def terminated(self, signals: Signals) -> Bool[Array, ""]:
-        """Never; only time ends an episode (paper)."""
+        """Never, s ∈ ∅ [1]; only time ends an episode.
+
+        Source:
+            Paper, fall recovery.
+        """
         del signals
         return jnp.zeros((), bool)
-
-    def advance(self, memory: Memory, signals: Signals) -> Memory:
-        """Nothing changes within an episode."""
-        del signals
-        return memory
 
     def measures(self, signals: Signals) -> dict[str, Float[Array, ""]]:
         """Tilt, joint error, and whether the hand is upright in this step.
 
-        `upright` is 1 where the stance-relative tilt is below 10° and the angular speed
-        below 4 rad/s (paper, upright detector, which asks for 0.5 s of it).
+        `upright` is 1 where tilt θ < 10° and ‖ω‖ < 4 rad/s; the upright detector asks
+        for 0.5 s of it.
+
+        Returns:
+            `upright` [1], `tilt_deg` [°], `joint_error_rad` [rad].
+
+        Source:
+            Paper, fall recovery (upright detector).
         """
         upright = level_and_calm(self.stance.q_off, signals.gravity_b, signals.angvel_b)
         return {
@@ -202,9 +225,17 @@ class Recovery(BareTask):
         }
 
     def episode_measures(
-        self, recorded: Mapping[str, Array], counts: Bool[Array, " T"]
+        self, recorded: Mapping[str, Shaped[Array, "T ..."]], counts: Bool[Array, " T"]
     ) -> dict[str, Float[Array, ""]]:
-        """Righted, how fast and how near the stance; over all falls and per side."""
+        """Righted, how fast and how near the stance; over all falls and per side.
+
+        Returns:
+            `righted` [1], `time_to_upright_s` [s], `final_joint_error_rad` = mean
+            |q − q*| [rad]; see `recovery_measures`.
+
+        Source:
+            Paper, fall recovery.
+        """
         return recovery_measures(recorded, counts, self.config.control_dt_s)
 
     @property
@@ -217,7 +248,34 @@ class Recovery(BareTask):
             self.config.action_scale_rad,
         )
 
-    def _pose(self, key: Array) -> Float[Array, "27"]:
+    def override(
+        self, plant: Plant, memory: Memory, action: Float[Array, "20"]
+    ) -> tuple[Memory, Float[Array, "20"]]:
+        """With `settle`, the ramp's motion once the hand is upright, a ← atanh(Δ/α).
+
+        Returns:
+            The memory with the settling of this step, and the output [1] that moves the
+            targets by Δ [rad] along the ramp.
+
+        Source:
+            Paper, fall recovery (settle ramp).
+        """
+        if not self.config.settle:
+            return memory, action
+        config, settle = self.config, self.settle
+        scale, clip = config.action_scale_rad, config.action_clip
+        action = jnp.clip(action, -clip, clip)
+        proposed = plant.next_target(memory.target, action, scale)
+        newest = jax.tree.map(lambda x: x[-1], memory.history)
+        settling, target = settle.step(
+            memory.task.settling, newest.gravity, newest.angvel, proposed, memory.steps
+        )
+        ramped = action_toward(memory.target, target, scale, clip)
+        action = jnp.where(memory.task.settling.begun, ramped, action)
+        task = memory.task.replace(settling=settling)
+        return memory.replace(task=task), action
+
+    def _pose(self, key: PRNGKeyArray) -> Float[Array, "27"]:
         """Generalized position of the fall or practice pose of an episode."""
         fall = jnp.array(self.falls.qpos)[self._drawn(key)]
         if not self.practice:
@@ -228,58 +286,9 @@ class Recovery(BareTask):
         chosen = jax.random.uniform(which) < self.config.practice_fraction
         return jnp.where(chosen, practice, fall)
 
-    def _drawn(self, key: Array) -> Int[Array, ""]:
+    def _drawn(self, key: PRNGKeyArray) -> Int[Array, ""]:
         """Number of the pose that an episode starts from."""
         return jax.random.randint(stream(key, "fall"), (), 0, len(self.falls.side))
 
     def _gravity_v(self, signals: Signals) -> Float[Array, "3"]:
         return unrotate(jnp.array(self.stance.q_off), signals.gravity_b)
-
-
-class RecoveryEnv(HandEnv):
-    """One world of fall recovery; the caller vmaps it.
-
-    Args:
-        config: settings of the task.
-        backend, num_worlds, hand, stance: see `envs.env.HandEnv`.
-    """
-
-    def __init__(
-        self,
-        config: RecoveryConfig | None = None,
-        backend: str = "cpu",
-        num_worlds: int = 1,
-        hand: HandFile | None = None,
-        stance: Stance | None = None,
-    ):
-        hand = hand or load_hand_file()
-        stance = stance or stance_of(hand)
-        config, falls = config or RecoveryConfig(), falls_of(hand, stance)
-        wanted = config.practice_fraction > 0.0 and not config.settle
-        practice = practice_of(hand, stance) if wanted else ()
-        middle_b = hand.nominal.palm.inertial_pos
-        task = Recovery(config, stance, falls, middle_b, practice)
-        super().__init__(task, backend, num_worlds, hand, stance)
-
-    def step(self, state: State, action: Float[Array, "20"]) -> State:
-        """Advances one control step; see `RecoveryConfig.settle`."""
-        if self.config.settle:
-            state, action = self._settled(state, action)
-        return super().step(state, action)
-
-    def _settled(
-        self, state: State, action: Float[Array, "20"]
-    ) -> tuple[State, Float[Array, "20"]]:
-        """Puts the ramp's motion in the place of the policy's, once it is upright."""
-        memory, config, settle = state.memory, self.config, self.task.settle
-        scale, clip = config.action_scale_rad, config.action_clip
-        action = jnp.clip(action, -clip, clip)
-        proposed = self.plant.next_target(memory.target, action, scale)
-        told = jax.tree.map(lambda x: x[-1], memory.history)
-        settling, target = settle.step(
-            memory.task.settling, told.gravity, told.angvel, proposed, memory.steps
-        )
-        ramped = action_toward(memory.target, target, scale, clip)
-        action = jnp.where(memory.task.settling.begun, ramped, action)
-        task = memory.task.replace(settling=settling)
-        return state.replace(memory=memory.replace(task=task)), action

@@ -9,6 +9,7 @@ import pytest
 from support import effects_hand as rig
 
 from envs.actuator.catalogue import CATALOGUE
+from envs.env import HandEnv
 from envs.errors import InputError
 from envs.hand.drive.chain import ChainState, chain_drive, in_chain
 from envs.hand.drive.servo import CommandState, ServoDrive
@@ -16,6 +17,7 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
 from envs.randomize import model_fields
+from envs.tasks.crawl import Crawl
 from envs.tasks.recovery.falls import falls_of
 
 STEPS = 25
@@ -149,9 +151,7 @@ def test_effects_that_this_hand_cannot_have_are_refused():
             hand, payload_mass=dataclasses.replace(hand.payload_mass, value=0.05)
         )
         with pytest.raises(InputError, match=field):
-            from envs.tasks.crawl import CrawlEnv
-
-            CrawlEnv(rig.CALM, hand=light, stance=load_stance())
+            HandEnv(Crawl(rig.CALM), hand=light, stance=load_stance())
 
 
 def test_the_scene_gets_what_effects_need_and_no_more():

@@ -8,8 +8,9 @@ import pytest
 
 from envs.config.typed import from_dict, override, to_dict
 from envs.errors import InputError
+from envs.registry import make_env
 from envs.scoring import scheduled_weights
-from envs.tasks.crawl import Crawl, CrawlConfig, CrawlEnv
+from envs.tasks.crawl import Crawl, CrawlConfig
 from rewards import CRAWL
 
 TERMS = {row.name for row in CRAWL}
@@ -25,7 +26,7 @@ def test_sizes(crawl):
     assert crawl.batch.action_size == 20
     logged = {k.removeprefix("reward/") for k in crawl.first.metrics if "/" in k}
     assert logged == TERMS
-    env = CrawlEnv()
+    env = make_env("crawl")
     assert (env.dt, env.episode_length) == (0.02, 1000)
 
 

@@ -12,8 +12,8 @@ from support.cli_setup import TRAIN, make_bundle, random_weights
 from support.keyboard_rig import Rig
 
 from envs.errors import InputError
-from envs.tasks.keyboard.fingertip import JOINTS
 from envs.tasks.keyboard.model import KEY_NAMES
+from envs.tasks.keyboard.stance import JOINTS
 from fingers_deploy import load_bundle
 from fingers_mjx.cli.play import key_times, keys_asked, start_board
 from fingers_mjx.evaluation.source import nominal

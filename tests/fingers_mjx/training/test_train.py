@@ -19,7 +19,7 @@ from support.probe_envs import Fault, probe
 from support.train_setup import assert_same_end, curve, leaves, make_env, run, setup
 
 from envs.errors import InputError
-from envs.settings import HandSettings
+from envs.task import HandSettings
 from fingers_mjx.policy.actor import act, load_policy
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.files import OutOfSpace

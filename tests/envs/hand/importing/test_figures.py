@@ -17,8 +17,7 @@ from envs.hand.importing.palm import Frame, rotation
 from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
 from envs.hand.stance import load_stance, stance_of
-from envs.tasks.crawl import CrawlEnv
-from envs.tasks.keyboard.task import KeyboardEnv
+from envs.registry import make_env
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
@@ -265,7 +264,7 @@ def test_hinges_that_turn_the_other_way_are_named(ours, tmp_path):
 
 def test_the_environment_runs_the_imported_hand(ours):
     hand = with_link(import_hand(ours).hand, 7, kp=0.5, range_rad=(-0.1, 1.2))
-    env = CrawlEnv(hand=hand)
+    env = make_env("crawl", hand=hand)
     assert env.mj_model.jnt_range[8] == pytest.approx([-0.1, 1.2])
     assert env.mj_model.actuator_gainprm[7, 0] == pytest.approx(0.5)
 
@@ -283,7 +282,7 @@ def test_the_keyboard_task_refuses_it():
     """Its fingertip is told by the vendor's figures, here and on the robot."""
     own = dataclasses.replace(HAND, figures=figures())
     with pytest.raises(InputError, match="hand file: figures"):
-        KeyboardEnv(hand=own)
+        make_env("keyboard", hand=own)
 
 
 FIELDS = [

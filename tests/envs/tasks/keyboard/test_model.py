@@ -8,7 +8,6 @@ from support.keyboard_rig import Rig
 
 from envs.hand.figures import figures
 from envs.hand.spec import HAND_NQ
-from envs.tasks.keyboard.fingertip import fingertip_v
 from envs.tasks.keyboard.model import (
     ACTUATION_M,
     ARROWS,
@@ -21,7 +20,7 @@ from envs.tasks.keyboard.model import (
     key_events,
     key_spring,
 )
-from envs.tasks.keyboard.stance import PLACEMENT, SUPPORTS
+from envs.tasks.keyboard.stance import PLACEMENT, SUPPORTS, fingertip_v
 
 
 def events(depths_mm, actuation_m=ACTUATION_M):

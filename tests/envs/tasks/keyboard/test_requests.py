@@ -18,7 +18,7 @@ from envs.tasks.keyboard.requests import (
     next_request,
     one_hot,
 )
-from envs.tasks.keyboard.task import KeyboardConfig
+from envs.tasks.keyboard.settings import KeyboardConfig
 
 DT_S, CONFIG = 0.02, RequestConfig(idle_s=(0.1, 0.2), timeout_s=0.3)
 KEYS = len(KEY_NAMES)
@@ -35,7 +35,7 @@ def asking(name, steps=0):
     )
 
 
-def told(outcome):
+def values(outcome):
     names = ("hit", "wrong", "timeout", "stray")
     return {name: float(getattr(outcome, name)) for name in names}
 
@@ -57,7 +57,7 @@ NOTHING = {"hit": 0.0, "wrong": 0.0, "timeout": 0.0, "stray": 0.0}
 )
 def test_the_first_event_decides(keys, steps, expected, latency_s):
     outcome = judge(asking("up", steps), pressed(*keys), CONFIG, DT_S)
-    assert told(outcome) == NOTHING | expected
+    assert values(outcome) == NOTHING | expected
     assert outcome.latency_s == pytest.approx(latency_s)
 
 
@@ -65,7 +65,7 @@ def test_keys_in_a_gap_decide_nothing():
     requests = dataclasses.replace(asking("up"), key=jnp.array(IDLE))
     assert not one_hot(requests).any()
     outcome = judge(requests, pressed("left", "enter"), CONFIG, DT_S)
-    assert told(outcome) == NOTHING | {"stray": 2.0}
+    assert values(outcome) == NOTHING | {"stray": 2.0}
 
 
 def test_half_of_the_episodes_begin_with_a_request():

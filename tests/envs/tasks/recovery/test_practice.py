@@ -1,7 +1,5 @@
 """Practice poses lie on the way down, and only training starts from them."""
 
-import json
-
 import jax
 import numpy as np
 import pytest
@@ -9,15 +7,15 @@ import pytest
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.stance import stance_of
+from envs.registry import make_env
 from envs.tasks.recovery.falls import clearance_m, down_b, load_falls, turned_down
 from envs.tasks.recovery.practice import (
     SINKING,
     TIPPING,
     load_practice,
-    practice_json,
     settle_practice,
 )
-from envs.tasks.recovery.task import RecoveryConfig, RecoveryEnv
+from envs.tasks.recovery.task import RecoveryConfig
 
 HAND = load_hand_file()
 LEVEL = down_b(np.array(stance_of(HAND).qpos))
@@ -38,7 +36,7 @@ def test_stored_poses_are_spread_from_the_stance_to_the_farthest_fall():
 
 @pytest.mark.slow
 def test_stored_poses_are_those_of_the_default_hand():
-    made = json.loads(practice_json(settle_practice(HAND, stance_of(HAND))))
+    made = settle_practice(HAND, stance_of(HAND))
     np.testing.assert_allclose(made, load_practice(), atol=1e-4)
 
 
@@ -57,8 +55,10 @@ def test_a_direction_is_turned_down(axis):
     ("fraction", "settle", "expected"),
     [(0.0, False, 0.0), (0.5, False, 0.5), (1.0, False, 1.0), (1.0, True, 0.0)],
 )
-def test_training_starts_from_them_as_often_as_it_is_told(fraction, settle, expected):
-    env = RecoveryEnv(RecoveryConfig(practice_fraction=fraction, settle=settle))
+def test_training_starts_from_them_as_often_as_configured(fraction, settle, expected):
+    env = make_env(
+        "recovery", RecoveryConfig(practice_fraction=fraction, settle=settle)
+    )
     keys = jax.random.split(jax.random.key(3), 400)
     joints = np.asarray(jax.vmap(env.task._pose)(keys))[:, 7:]
     falls = np.array(load_falls().qpos, np.float32)[:, 7:]

@@ -73,16 +73,16 @@ def by_the_env(settle, quats, gyro, proposed):
         settling, target = settle.step(settling, *now)
         return settling, (settling.begun, target, settle.over(settling, now[3]))
 
-    told = (down, jnp.array(gyro), jnp.array(proposed), jnp.arange(STEPS))
-    _, (begun, targets, over) = jax.lax.scan(step, start_settling(20), told)
+    inputs = (down, jnp.array(gyro), jnp.array(proposed), jnp.arange(STEPS))
+    _, (begun, targets, over) = jax.lax.scan(step, start_settling(20), inputs)
     return np.asarray(begun), np.asarray(targets), np.asarray(over)
 
 
 @pytest.mark.parametrize("away_rad", [0.0, 2.5], ids=["near", "far"])
 def test_detector_and_ramp_are_those_of_the_shim(settle, interface, away_rad):
-    told = motion(settle, away_rad)
-    fired, targets, duration_s = by_the_shim(interface, *told)
-    begun, ours, over = by_the_env(settle, *told)
+    inputs = motion(settle, away_rad)
+    fired, targets, duration_s = by_the_shim(interface, *inputs)
+    begun, ours, over = by_the_env(settle, *inputs)
     assert fired == 67 + 25 == begun.argmax()
     np.testing.assert_allclose(ours, targets, atol=2e-6)
     end = fired + int(np.ceil(duration_s / DT_S - 1e-6))

@@ -11,7 +11,7 @@ from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
 from envs.hand.stance import stance_of
 from envs.randomize import no_randomization
-from envs.registry import make_batch
+from envs.registry import make_batch, make_env
 from envs.rotations import multiply
 from envs.tasks.recovery.falls import (
     POSES_PER_SIDE,
@@ -22,7 +22,7 @@ from envs.tasks.recovery.falls import (
     load_falls,
     settle_falls,
 )
-from envs.tasks.recovery.task import RecoveryConfig, RecoveryEnv
+from envs.tasks.recovery.task import RecoveryConfig
 from rewards import RECOVERY
 
 
@@ -46,7 +46,7 @@ def test_sizes_are_those_of_the_crawl_policy(recovery):
     assert recovery.batch.observation_size == {"state": 392, "privileged_state": 427}
     logged = {k.removeprefix("reward/") for k in recovery.first.metrics if "/" in k}
     assert logged == {row.name for row in RECOVERY}
-    env = RecoveryEnv()
+    env = make_env("recovery")
     assert (env.dt, env.episode_length) == (0.02, 1000)
     assert env.config.action_scale_rad == 0.060
 

@@ -2,14 +2,14 @@ import jax
 import numpy as np
 import pytest
 
+from envs.registry import make_env
 from envs.signals import tilt
-from envs.tasks.crawl import CrawlEnv
-from envs.tasks.start import near_stance
+from envs.tasks.upright import near_stance
 
 
 @pytest.fixture(scope="module")
 def plant():
-    return CrawlEnv().plant
+    return make_env("crawl").plant
 
 
 def many(plant, joint_rad=0.05, speed_mps=0.05):
