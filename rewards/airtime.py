@@ -16,7 +16,7 @@ class AirTimeParams:
     that walks at up to 1 m/s; the crawl command ends at 0.16 m/s per axis.
 
     Attributes:
-        threshold_s: swing that is worth nothing; longer ones are paid.
+        threshold_s: T₀, swing that pays nothing; longer ones pay.
         command_threshold_mps: commanded planar speed that must be exceeded.
         force_threshold_n: F_th, see `rewards.gates.in_contact`.
     """

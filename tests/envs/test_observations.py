@@ -18,7 +18,7 @@ OFFSETS = {"joint_pos": 0, "gravity": 160, "angvel": 184, "action": 208, "comman
 
 
 def sample(number: float) -> Sample:
-    """Values that tell step, term and entry apart: 100 step + 1000 term + entry."""
+    """Values that distinguish step, term and entry: 100 step + 1000 term + entry."""
     entries = {
         name: 100.0 * number + 1000.0 * index + jnp.arange(float(size))
         for index, (name, size) in enumerate(SIZES.items())

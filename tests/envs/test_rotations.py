@@ -18,7 +18,7 @@ QUATERNION = (
     .map(lambda q: q / np.linalg.norm(q))
 )
 product, turn, unturn = jax.jit(multiply), jax.jit(rotate), jax.jit(unrotate)
-inverse, bent = jax.jit(conjugate), jax.jit(from_vector)
+inverse, from_rotation = jax.jit(conjugate), jax.jit(from_vector)
 down, leaning = jax.jit(gravity), jax.jit(tilt)
 
 
@@ -62,7 +62,7 @@ def test_gravity_is_a_unit_vector_and_tilt_an_angle(count):
 @counts
 def test_the_rotation_of_a_vector_is_a_unit_quaternion(count):
     def check(v):
-        assert abs(np.linalg.norm(bent(v / 10)) - 1) < 1e-6
+        assert abs(np.linalg.norm(from_rotation(v / 10)) - 1) < 1e-6
 
     holds(count, check, VECTOR)
 
@@ -70,7 +70,11 @@ def test_the_rotation_of_a_vector_is_a_unit_quaternion(count):
 def test_rotation_vectors_and_headings():
     expected = [np.cos(0.35), 0, 0, np.sin(0.35)]
     np.testing.assert_allclose(about_z(jnp.float32(0.7)), expected, atol=1e-7)
-    np.testing.assert_allclose(bent(np.float32([0, 0, 0.7])), expected, atol=1e-6)
-    np.testing.assert_allclose(bent(np.zeros(3, np.float32)), [1, 0, 0, 0], atol=1e-7)
+    np.testing.assert_allclose(
+        from_rotation(np.float32([0, 0, 0.7])), expected, atol=1e-6
+    )
+    np.testing.assert_allclose(
+        from_rotation(np.zeros(3, np.float32)), [1, 0, 0, 0], atol=1e-7
+    )
     gradient = jax.jacobian(from_vector)(jnp.zeros(3))
     np.testing.assert_allclose(gradient[1:], 0.5 * np.eye(3), atol=1e-6)

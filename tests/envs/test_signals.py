@@ -1,4 +1,4 @@
-"""Signals against figures that C MuJoCo gives in another way than its sensors."""
+"""Signals against values that C MuJoCo gives in another way than its sensors."""
 
 from functools import partial
 
@@ -91,7 +91,7 @@ def test_tips(moving):
 
 
 def test_tip_velocity_in_a_turning_hand_is_not_that_in_the_world(moving):
-    """Negative control: without the base's rotation the figures above would not fit."""
+    """Negative control: without the base's rotation the values above would not fit."""
     signals = read(moving)
     axes = moving.site(V_SITE).xmat.reshape(3, 3)
     without = (np.asarray(signals.tip_vel_w) - moving.qvel[:3]) @ axes

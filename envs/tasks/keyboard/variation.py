@@ -48,7 +48,7 @@ class KeyboardVariation:
 
 
 def nominal_keyboard() -> KeyboardVariation:
-    """The keyboard of the figures, perfectly aligned."""
+    """The keyboard of the data sheet, perfectly aligned."""
     depth = (ACTUATION_M, ACTUATION_M)
     return KeyboardVariation((1.0, 1.0), depth, 0.0, 0.0, 0.0)
 

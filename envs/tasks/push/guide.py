@@ -1,7 +1,7 @@
 """The velocity that a pushing hand is asked for in training: around, behind, ahead.
 
 Rewards of walking need a command. This one is worked out from the true state, which the
-policy does not see: it has to find the same from what the camera tells.
+policy does not see: it has to find the same from the camera's samples.
 """
 
 import jax.numpy as jnp

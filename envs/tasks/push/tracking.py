@@ -98,7 +98,7 @@ def to_v(
     up = -gravity_v
     ahead = jnp.array([1.0, 0.0, 0.0]) - up[0] * up
     ahead = ahead / jnp.sqrt(jnp.sum(ahead**2))
-    left = jnp.cross(up, ahead)
+    beside = jnp.cross(up, ahead)
     cos, sin = jnp.cos(heading_rad), jnp.sin(heading_rad)
     x, y, z = vector_w
-    return (cos * x + sin * y) * ahead + (cos * y - sin * x) * left + z * up
+    return (cos * x + sin * y) * ahead + (cos * y - sin * x) * beside + z * up

@@ -18,7 +18,7 @@ CLEAN = CameraConfig(dropout=0.0, position_noise_m=0.0, heading_noise_rad=0.0)
 
 
 def truth(t_s):
-    """A scene whose position tells the time: x = t in both bodies."""
+    """A scene whose position is the time: x = t in both bodies."""
     t_s = jnp.asarray(t_s, jnp.float32)
     return Frame(t_s, jnp.array([t_s, 0, 0]), jnp.array([t_s, 1, 0]), 3.0 * t_s)
 

@@ -148,7 +148,7 @@ def test_settling_takes_an_upright_hand_to_the_stance_whatever_the_policy_does()
     config = RecoveryConfig(settle=True, randomize=no_randomization(0.8))
     batch = make_batch("recovery", 2, config, auto_reset=False)
     start = jax.jit(batch.reset)(jax.random.key(5))
-    # Its sensors tell of the stance from the second step on.
+    # Its sensors measure the stance from the second step on.
     states = [in_stance(start, batch.stance)]
     states[0] = states[0].replace(
         data=states[0].data.replace(
@@ -164,9 +164,9 @@ def test_settling_takes_an_upright_hand_to_the_stance_whatever_the_policy_does()
     assert begun[:, 0].argmax() == 26 and begun[26:, 0].all()
     assert over[:, 0].argmax() == 26 + 75
     assert not begun[:, 1].any() and not over[:, 1].any()  # it still lies there
-    bent, settled = (np.asarray(states[k].memory.target)[0] for k in (27, -1))
+    curled, settled = (np.asarray(states[k].memory.target)[0] for k in (27, -1))
     stance = np.asarray(batch.stance.target_rad)
-    assert np.abs(bent - stance).max() > 0.1
+    assert np.abs(curled - stance).max() > 0.1
     np.testing.assert_allclose(settled, stance, atol=1e-6)
     assert states[-1].signals.extra["joint_error_rad"][0] < 0.01
 
