@@ -5,7 +5,7 @@ from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """Bad input, told in one sentence that names where, what was found and what fits.
+    """Bad input: one sentence names the place, what was found and what is valid.
 
     Args:
         source: file, command-line option or argument in which the value stands.

@@ -106,9 +106,16 @@ class Plant:
     def replace_invalid(
         self, output: PhysicsOutput
     ) -> tuple[PhysicsOutput, Bool[Array, ""]]:
-        """Puts the stance in the place of a non-finite result, which ends the episode.
+        """Replaces a non-finite result: s' ← s' if all finite, else the stance.
 
-        The step counts as invalid and pays nothing; nothing that it computed is used.
+        The step then counts as invalid, ends the episode and pays nothing; nothing that
+        it computed is used.
+
+        Args:
+            output: state and sensors after a step [m, rad, m/s, rad/s].
+
+        Source:
+            Ours: one diverged world must not reach the gradients of all.
         """
         leaves = jax.tree.leaves((output.state, output.sensordata))
         finite = jnp.all(jnp.stack([jnp.all(jnp.isfinite(x)) for x in leaves]))

@@ -12,7 +12,7 @@ import flax.struct
 import jax
 import jax.numpy as jnp
 import mujoco
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.errors import check_ordered
 from envs.hand.spec import HandSpec
@@ -88,8 +88,20 @@ class Variation:
     gyro_bias_rps: Float[Array, "*b 3"]
 
 
-def draw_variation(key: Array, config: RandomizeConfig) -> Variation:
-    """Draws one world, each quantity from a stream of its own."""
+def draw_variation(key: PRNGKeyArray, config: RandomizeConfig) -> Variation:
+    """Draws one world: x = U(low, high) for each quantity [rad, m, 1].
+
+    Each quantity has a stream of its own, so that a new one leaves the others as they
+    were.
+
+    Args:
+        key: of the draw.
+        config: the ranges.
+
+    Source:
+        Paper, domain randomization (friction, gains, effort, payload); palm, IMU and
+        noise ours.
+    """
 
     def uniform(name: str, shape: tuple[int, ...], low: Any, high: Any) -> Array:
         return jax.random.uniform(stream(key, name), shape, minval=low, maxval=high)

@@ -14,11 +14,15 @@ from rewards import safe_norm
 
 
 def imu_of(data: PhysicsState, down_w: Float[Array, "3"]) -> Imu:
-    """What an IMU in the palm measures without error.
+    """An IMU in the palm without error: g = Rᵀ d [1], ω = body rate [rad/s].
 
     Args:
         data: the state that is measured.
-        down_w: unit vector of gravity in the world.
+        down_w: d, unit vector of gravity in the world.
+
+    Source:
+        O. Woodman, An Introduction to Inertial Navigation, University of Cambridge,
+        UCAM-CL-TR-696, 2007.
     """
     return Imu(gravity=unrotate(data.qpos[3:7], down_w), angvel=data.qvel[3:6])
 
@@ -30,14 +34,21 @@ def sense(
     imu: Imu,
     action: Float[Array, "20"],
 ) -> Sample:
-    """What the actor observes of one control step, but for the task's inputs.
+    """What the actor observes of one control step, without the task's inputs.
+
+        q̂ = q + n_q,   ĝ = R (g + n_g) / |g + n_g|,   ω̂ = R (ω + b) + n_ω
+
+    with the mounting error R, the gyro's bias b and fresh uniform noise n.
 
     Args:
         config: bounds of the noise.
         world: the world's biases, and what its fresh noise is drawn from.
         joint_pos: joint angles less those that read as zero [rad].
-        imu: what a perfectly mounted IMU measures.
-        action: last clipped policy output.
+        imu: gravity g [1] and angular velocity ω [rad/s] of a perfectly mounted IMU.
+        action: last clipped policy output [1].
+
+    Source:
+        Paper, policy interfaces and domain randomization; sizes of bias and noise ours.
     """
     variation = world.variation
     key = world.step_key("noise")

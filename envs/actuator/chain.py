@@ -79,6 +79,9 @@ def chain_step(
 
     Raises:
         InputError: an effect needs surroundings that are not given.
+
+    Source:
+        Paper, command path and actuators; each effect names its own.
     """
     _check_surroundings(model, joint.around)
     x = _signals(joint)

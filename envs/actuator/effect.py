@@ -3,7 +3,7 @@
 An effect is one file with one `EffectKind`. Its functions work elementwise in the
 joints: the same code serves one joint of a test stand and the twenty of a hand, a
 single world and a batch under `vmap`, identification and training. Effects of the
-whole hand change the physics model or what the IMU tells instead.
+whole hand change the physics model or what the IMU measures.
 """
 
 import enum
@@ -28,10 +28,10 @@ class Substep:
     Attributes:
         command: what the servo follows [rad]; first the target.
         q, qd: joint angle [rad] and speed [rad/s] of the physics.
-        encoder, encoder_speed: what the servo's encoder tells it [rad], [rad/s].
+        encoder, encoder_speed: what the servo's encoder measures [rad], [rad/s].
         error: command − encoder, as the servo weighs it [rad].
         kp, kd: gains of the servo [N·m/rad], [N·m·s/rad].
-        effort: torque of the motor, as its current tells it [N·m].
+        effort: torque of the motor, measured by its current [N·m].
         follows: share of kp and kd with which the effort follows error and speed; 0
             where it is limited.
         torque: torque of the drive on the joint [N·m]: the effort behind the gears.
@@ -115,7 +115,18 @@ class Prior:
     spread: float
 
     def log_density(self, value: Float[ArrayLike, "*j"]) -> Float[Array, "*j"]:
-        """Returns log p(value) but for a constant."""
+        """Log density up to a constant: log p(x) [1].
+
+            normal:     −z²/2,           z = (x − μ) / σ
+            lognormal:  −z²/2 − log x,   z = log(x / μ) / log σ
+
+        Args:
+            value: x, in the parameter's own unit [rad, N·m, …]; > 0 if lognormal.
+
+        Source:
+            C. Bishop, Pattern Recognition and Machine Learning, 2006 (Gaussian and its
+            change of variables).
+        """
         value = jnp.asarray(value)
         if self.kind == "lognormal":
             z = jnp.log(value / self.center) / jnp.log(self.spread)
@@ -159,7 +170,7 @@ class EffectKind:
         parameters: its parameters by name.
         acts: its functions by the stage at which the chain calls them.
         confusable_with: effects that leave like traces, each with the experiment that
-            tells them apart.
+            distinguishes them.
         source: literature.
         init: state at rest, from (parameters, target [rad], angle [rad], substep [s]).
         scope: what one value of its parameters holds for.

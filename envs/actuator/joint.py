@@ -1,6 +1,6 @@
 """Motion of one joint with dry friction that sticks, for logs of single joints.
 
-In the physics of the hand the same figures are `frictionloss`, `damping` and
+In the physics of the hand the same quantities are `frictionloss`, `damping` and
 `armature` of the joint and the velocity gain of its actuator. MuJoCo solves friction as
 a constraint in the same way: it opposes motion with at most its bound and stops it, but
 never turns it round; and it takes damping and velocity gain implicitly.
@@ -31,6 +31,10 @@ def joint_step(
 
     Returns:
         Angle [rad] and speed [rad/s] after the substep.
+
+    Source:
+        Ours, after MuJoCo's implicit integration of damping and its dry friction as a
+        bounded constraint (MuJoCo documentation, Computation).
     """
     total = jnp.maximum(inertia + x.inertia, 0.0)
     heavy = total + dt * (x.viscous + x.damping)

@@ -77,7 +77,7 @@ class Scene:
 
 @flax.struct.dataclass
 class Imu:
-    """What an IMU tells, in its own frame, nominally the palm's.
+    """What an IMU measures, in its own frame, nominally the palm's.
 
     Attributes:
         gravity: unit vector of gravity, which points down.

@@ -8,7 +8,7 @@ import jax
 import jax.numpy as jnp
 import mujoco
 import numpy as np
-from jaxtyping import Array, Bool, Float, Int
+from jaxtyping import Array, Bool, Float, Int, Shaped
 
 from envs.errors import InputError
 
@@ -18,8 +18,16 @@ ModelFields = dict[str, Array]
 Fields of `MjOption` are named `opt.<name>`, e.g. `opt.gravity`."""
 
 
-def nominal_field(mj_model: mujoco.MjModel, name: str) -> np.ndarray:
-    """The nominal value of a model field, also of one of its options."""
+def nominal_field(mj_model: mujoco.MjModel, name: str) -> Shaped[np.ndarray, "..."]:
+    """The nominal value of a model field: x = model.name, in MuJoCo's units [m, kg, s].
+
+    Args:
+        mj_model: the model.
+        name: a field, or `opt.<name>` for one of its options.
+
+    Source:
+        MuJoCo documentation, `mjModel`.
+    """
     return functools.reduce(getattr, name.split("."), mj_model)
 
 
@@ -75,7 +83,16 @@ class Physics(Protocol):
         state: PhysicsState,
         ctrl: Float[Array, "substeps nu"],
     ) -> PhysicsOutput:
-        """Advances one world by one control step."""
+        """One control step of one world: (s, u₁ … u_n; fields) ↦ (s', sensors).
+
+        Args:
+            fields: what differs from the nominal model.
+            state: positions [m, rad] and velocities [m/s, rad/s] before.
+            ctrl: controls of the substeps [rad].
+
+        Source:
+            MuJoCo documentation, Computation.
+        """
         ...
 
 

@@ -59,13 +59,21 @@ class CpuPhysics:
         state: PhysicsState,
         ctrl: Float[Array, "substeps nu"],
     ) -> PhysicsOutput:
-        """Advances one world by one control step; see `envs.physics.Physics`.
+        """One control step of one world: (s, u₁ … u_n; fields) ↦ (s', sensors).
 
         Under vmap, all worlds are one call of the host.
+
+        Args:
+            fields: what differs from the nominal model.
+            state: positions [m, rad] and velocities [m/s, rad/s] before.
+            ctrl: controls of the substeps [rad].
 
         Raises:
             InputError: the inertia of a body is given that C MuJoCo fixes when it
                 compiles the model.
+
+        Source:
+            MuJoCo documentation, Computation.
         """
         _check_fields(self.mj_model, fields)
         model, vector = self.mj_model, jax.ShapeDtypeStruct

@@ -74,10 +74,18 @@ class MjxPhysics:
         state: PhysicsState,
         ctrl: Float[Array, "substeps nu"],
     ) -> PhysicsOutput:
-        """Advances one world by one control step; see `envs.physics.Physics`.
+        """One control step of one world: (s, u₁ … u_n; fields) ↦ (s', sensors).
+
+        Args:
+            fields: what differs from the nominal model.
+            state: positions [m, rad] and velocities [m/s, rad/s] before.
+            ctrl: controls of the substeps [rad].
 
         Raises:
             InputError: `fields` names a field that cannot differ between worlds.
+
+        Source:
+            MuJoCo documentation, Computation and MuJoCo XLA.
         """
         if self.impl == "warp":
             _check_batchable(fields)

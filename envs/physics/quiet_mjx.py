@@ -2,7 +2,7 @@
 
 Without warp-lang, `import mujoco.mjx` prints two "Failed to import warp" lines on
 standard output, which belongs to the JSON and tables of our commands. What it says is
-kept in `IMPORT_MESSAGES`, so that asking for Warp can still tell why it is missing.
+kept in `IMPORT_MESSAGES`, so that asking for Warp can still say why it is missing.
 """
 
 import contextlib

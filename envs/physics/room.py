@@ -1,7 +1,7 @@
 """Room for contacts and constraints, of which Warp has only as much as it is given.
 
 What does not fit is dropped: the hand then stands on fewer contacts than it has. So
-each overflow is a metric of its step, training stops at it unless told otherwise, and
+each overflow is a metric of its step, training stops at it unless asked not to, and
 an evaluation in which there was one has no result.
 """
 
@@ -23,10 +23,15 @@ CONSTRAINT_BITS = 0b11
 
 
 def overflow_metrics(bits: Int[Array, ""]) -> dict[str, Float[Array, ""]]:
-    """Returns the metrics of `ROOM`: 1 where something was dropped in this step.
+    """Metrics of `ROOM`: 1 where bits ∧ mask ≠ 0, else 0 [1].
+
+    A one means that contacts or constraints were dropped in this step.
 
     Args:
         bits: `PhysicsOutput.overflow` of the step.
+
+    Source:
+        MuJoCo Warp, `OverflowType`.
     """
     constraints = bits & CONSTRAINT_BITS
     found = {"contact_overflow": bits ^ constraints, "constraint_overflow": constraints}
@@ -36,7 +41,7 @@ def overflow_metrics(bits: Int[Array, ""]) -> dict[str, Float[Array, ""]]:
 def too_little_room(
     source: object, metric: str, config: Any, more: str = ""
 ) -> InputError:
-    """Returns the error that tells which setting to raise.
+    """Returns the error that names the setting to raise.
 
     Args:
         source: what was running, and how many worlds or episodes were hit.

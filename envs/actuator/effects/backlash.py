@@ -1,4 +1,4 @@
-"""Play between motor, whose angle the encoder tells, and joint."""
+"""Play between motor, whose angle the encoder measures, and joint."""
 
 import jax.numpy as jnp
 

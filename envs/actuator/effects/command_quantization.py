@@ -9,7 +9,16 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 def quantized(
     command: Float[Array, "*j"], step_rad: Float[ArrayLike, "*#j"]
 ) -> Float[Array, "*j"]:
-    """Rounds to the nearest step; a step of zero leaves the command as it is."""
+    """Rounds to the nearest step: c = Δ round(u / Δ) [rad]; c = u for Δ = 0.
+
+    Args:
+        command: u [rad].
+        step_rad: Δ [rad], ≥ 0.
+
+    Source:
+        K. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd ed., 1997
+        (quantization).
+    """
     step_rad = jnp.asarray(step_rad)
     safe = jnp.where(step_rad > 0.0, step_rad, 1.0)
     return jnp.where(step_rad > 0.0, jnp.round(command / safe) * safe, command)

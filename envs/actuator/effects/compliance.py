@@ -1,4 +1,4 @@
-"""A spring between motor, whose angle the encoder tells, and joint."""
+"""A spring between motor, whose angle the encoder measures, and joint."""
 
 import flax.struct
 import jax.numpy as jnp
@@ -24,7 +24,7 @@ class Spring:
 
 
 def _encoder(params: Params, spring: Spring, x, dt):
-    """Finishes the last substep with the joint's speed, and tells the motor's angle."""
+    """Finishes the last substep with the joint's speed; returns the motor's angle."""
     torque = spring.base - spring.slope * x.qd
     lag = params["compliance_rad_nm"]
     ahead = lag * (torque - spring.torque) / dt

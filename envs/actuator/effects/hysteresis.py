@@ -5,27 +5,27 @@ import jax.numpy as jnp
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 
-def _bent(bend, x, dt, reach):
-    """Bend after a substep at the present speed, exactly; never beyond 1."""
+def _deflected(z, x, dt, reach):
+    """Deflection z after a substep at the present speed, exactly; never beyond 1."""
     way = jnp.sign(x.qd)
-    return way + (bend - way) * jnp.exp(-jnp.abs(x.qd) * dt / reach)
+    return way + (z - way) * jnp.exp(-jnp.abs(x.qd) * dt / reach)
 
 
-def _act(params: Params, bend, x, dt):
-    """Bends by the motion of the last substep and predicts the bend of this one.
+def _act(params: Params, z, x, dt):
+    """Deflects by the motion of the last substep and predicts that of this one.
 
     Passive: F d z² / 2 is stored, and of the power F z q̇ that the joint gives the part
     F z² |q̇| is lost. The damping makes the prediction implicit in the speed: the spring
     of this slope, and the friction F z² that stops a joint and never turns it round.
     """
     limit, reach = params["torque_nm"], params["range_rad"]
-    bend = _bent(bend, x, dt, reach)
-    coming = _bent(bend, x, dt, reach)
+    z = _deflected(z, x, dt, reach)
+    coming = _deflected(z, x, dt, reach)
     along = jnp.sign(x.qd) * coming
     speed = jnp.where(x.qd == 0.0, 1.0, jnp.abs(x.qd))
     spring = limit / reach * (1.0 - along) * dt
     brake = limit * jnp.maximum(along, 0.0) ** 2 / speed
-    return bend, x.replace(
+    return z, x.replace(
         passive=x.passive - limit * coming,
         damping=x.damping + spring + brake,
     )

@@ -18,7 +18,7 @@ EFFECT = EffectKind(
     parameters={"x_rad_s": _AXIS, "y_rad_s": _AXIS, "z_rad_s": _AXIS},
     acts={},
     confusable_with={
-        "imu_misalignment": "rest: a bias remains, a turned axis tells nothing",
+        "imu_misalignment": "rest: a bias remains, a turned axis measures zero",
     },
     source="O. Woodman, An Introduction to Inertial Navigation, University of "
     "Cambridge, UCAM-CL-TR-696, 2007",

@@ -21,7 +21,7 @@ EFFECT = EffectKind(
     parameters={"x_rad": _AXIS, "y_rad": _AXIS, "z_rad": _AXIS},
     acts={},
     confusable_with={
-        "imu_bias": "rest: a bias remains, a turned axis tells nothing",
+        "imu_bias": "rest: a bias remains, a turned axis measures zero",
         "floor_tilt": "turn the hand: an IMU turns with it",
     },
     source="O. Woodman, An Introduction to Inertial Navigation, University of "

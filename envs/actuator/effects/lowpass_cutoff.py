@@ -14,10 +14,20 @@ def filtered(
 ) -> Float[Array, "*j"]:
     """Advances the low-pass, exactly for a command that is held over the substep.
 
-    y' = y + (1 − e^{−2π f_c Δt}) (u − y). Its time constant 1/(2πf_c) does not depend
-    on Δt. The backward Euler factor Δt/(Δt + 1/2πf_c) of the vendor's host-side
+    y' = y + (1 − e^{−2π f_c Δt}) (u − y) [rad]. Its time constant 1/(2πf_c) does not
+    depend on Δt. The backward Euler factor Δt/(Δt + 1/2πf_c) of the vendor's host-side
     fallback does (4 % slower at 3 Hz and 200 Hz), while the firmware that it stands for
     runs much faster.
+
+    Args:
+        last: y [rad].
+        command: u [rad].
+        cutoff_hz: f_c [Hz], > 0; infinite: no filter.
+        dt: substep Δt [s].
+
+    Source:
+        Paper, command path; K. Åström, B. Wittenmark, Computer-Controlled Systems, 3rd
+        ed., 1997 (zero-order-hold sampling).
     """
     alpha = -jnp.expm1(-2.0 * jnp.pi * cutoff_hz * dt)
     return last + alpha * (command - last)

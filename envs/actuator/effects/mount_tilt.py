@@ -11,7 +11,19 @@ def tilted(
     roll: Float[ArrayLike, "*#j"],
     pitch: Float[ArrayLike, "*#j"],
 ) -> Float[Array, "*j 3"]:
-    """Returns gravity in a frame that is turned by (roll, pitch, 0), as a vector."""
+    """Gravity in a turned frame: g' = R(ρ)ᵀ g, ρ = (roll, pitch, 0) [m/s²].
+
+    R is the rotation by |ρ| about ρ, as a quaternion (cos |ρ|/2, sinc(|ρ|/2) ρ/2).
+
+    Args:
+        gravity: g in the frame that is level [m/s²].
+        roll: angle about x [rad].
+        pitch: angle about y [rad].
+
+    Source:
+        J. Solà, Quaternion kinematics for the error-state Kalman filter, arXiv
+        1711.02508 (rotation vector to quaternion).
+    """
     gravity = jnp.asarray(gravity)
     turn = jnp.stack(jnp.broadcast_arrays(roll, pitch, 0.0), axis=-1)
     half = -0.5 * turn

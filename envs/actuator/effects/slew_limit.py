@@ -12,7 +12,17 @@ def limited(
     speed_rad_s: Float[ArrayLike, "*#j"],
     dt: float | Float[Array, "*j"],
 ) -> Float[Array, "*j"]:
-    """Moves towards the command by at most v_max Δt."""
+    """Moves towards the command: c' = clip(u, c ± v_max Δt) [rad].
+
+    Args:
+        last: c, of the substep before [rad].
+        command: u [rad].
+        speed_rad_s: v_max [rad/s], > 0; infinite: no limit.
+        dt: substep Δt [s].
+
+    Source:
+        Paper, command path.
+    """
     reach = speed_rad_s * dt
     return jnp.clip(command, last - reach, last + reach)
 

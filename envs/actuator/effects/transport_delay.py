@@ -11,7 +11,15 @@ MAX_DELAY_S = 0.1
 
 
 def delay_line(rest: Float[Array, "*j"], dt: float) -> Float[Array, " slots *j"]:
-    """Returns a line that holds `rest` for `MAX_DELAY_S`, newest sample first."""
+    """A line at rest, newest sample first: u_k = rest, k = 0 … ⌈MAX_DELAY_S / Δt⌉.
+
+    Args:
+        rest: target that has been sent since t = −∞ [rad].
+        dt: substep Δt [s].
+
+    Source:
+        Ours: the length is fixed, so that the delay may be traced.
+    """
     slots = math.ceil(round(MAX_DELAY_S / dt, 6)) + 1
     return jnp.broadcast_to(rest, (slots, *jnp.shape(rest)))
 
@@ -19,7 +27,19 @@ def delay_line(rest: Float[Array, "*j"], dt: float) -> Float[Array, " slots *j"]
 def read_delayed(
     line: Float[Array, " slots *j"], delay_s: Float[ArrayLike, "*#j"], dt: float
 ) -> Float[Array, "*j"]:
-    """Reads the line at a fractional age: linear between the two samples around it."""
+    """Reads the line at a fractional age a = T / Δt: Σ_k max(0, 1 − |k − a|) u_k [rad].
+
+    Linear between the two samples around it, hence exact on ramps.
+
+    Args:
+        line: samples u_k, newest first [rad].
+        delay_s: T [s], clipped to what the line holds.
+        dt: substep Δt [s].
+
+    Source:
+        T. Laakso et al., Splitting the Unit Delay, IEEE Signal Processing Magazine
+        13(1), 1996 (linear interpolation).
+    """
     age = jnp.clip(delay_s / dt, 0.0, line.shape[0] - 1.0)
     age = jnp.broadcast_to(age, line.shape[1:])
     ages = jnp.arange(line.shape[0]).reshape(-1, *[1] * age.ndim)
