@@ -18,7 +18,7 @@ PACKAGES = {
 }
 MAY_IMPORT = {
     "rewards": (),
-    "envs": ("rewards",),
+    "envs": ("rewards", "fingers_deploy"),
     "sysid": ("rewards", "envs"),
     "fingers_mjx": ("rewards", "envs", "sysid", "fingers_deploy", "fingers_robot"),
     "fingers_deploy": (),

@@ -4,8 +4,7 @@ import math
 import re
 from typing import Any
 
-from fingers_deploy.decode import decode, load_json, nearest
-from fingers_deploy.errors import BundleError
+from fingers_deploy.errors import BundleError, one_of
 from fingers_deploy.manifest import (
     ACTION_TRANSFORM,
     HISTORY_ORDER,
@@ -15,6 +14,7 @@ from fingers_deploy.manifest import (
     Manifest,
     Term,
 )
+from fingers_deploy.strict_json import from_json, load_json
 
 # Size, frame and unit of every term that can be put together here. None: free, because
 # the caller supplies the command as the manifest describes it.
@@ -50,7 +50,7 @@ def parse_manifest(text: str | bytes, source: object) -> Manifest:
     """
     value, problem = load_json(text, source), _Problems(source)
     _check_version(value, problem)
-    manifest: Manifest = decode(Manifest, value, source, "")
+    manifest: Manifest = from_json(Manifest, value, source)
     _check_head(manifest, problem)
     _check_joints(manifest.interface, problem)
     _check_terms(manifest.interface, problem)
@@ -140,7 +140,7 @@ def _check_terms(interface: Interface, problem: _Problems) -> None:
 
 def _check_term(field: str, term: Term, problem: _Problems) -> None:
     known = term.name in TERM_FRAMES
-    valid = nearest(TERM_FRAMES, term.name)
+    valid = one_of(TERM_FRAMES, term.name)
     problem.unless(known, f"{field}.name", term.name, valid)
     size, frame, unit = TERM_FRAMES[term.name]
     problem.unless(

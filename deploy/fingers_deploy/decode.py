@@ -1,170 +1,200 @@
-"""Strict decoding of JSON into frozen dataclasses.
+"""Strict decoding of plain data into frozen dataclasses.
 
-The type annotations are the schema. Nothing is converted, defaulted or ignored: an
-unknown, missing or repeated key, another type or a non-finite number is refused by a
-sentence that names the field.
+The type annotations are the schema. Nothing is guessed or ignored: an unknown or
+missing name, another type or a number out of range is refused by a sentence that names
+the field. What two formats differ in is their `Rules`.
 """
 
+import contextlib
 import dataclasses
-import difflib
-import json
-import math
+import functools
 import types
 import typing
-from collections.abc import Iterable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from fingers_deploy.errors import BundleError
+from fingers_deploy.errors import one_of
 
-_MAX_TEXT = 200
-_FLOAT32_MAX = 3.4028234663852886e38  # all arithmetic behind the manifest is float32
+_WORDS = {int: "a whole number", float: "a finite number", bool: "true or false"}
 
 
-def load_json(text: str | bytes, source: object) -> Any:
-    """Reads JSON without repeated keys.
+@dataclasses.dataclass(frozen=True)
+class Rules:
+    """What a format decides.
 
-    NaN and infinity, which Python reads, are refused by `decode`, field by field.
-
-    Args:
-        text: the JSON.
-        source: name of the file, for messages.
-
-    Raises:
-        BundleError: the text is not strict JSON.
+    Attributes:
+        scalar: checks a bool, int, float or text of a kind at its place.
+        error: class of the errors, made and read like `InputError`.
+        complete: whether fields that have a default must be there too.
+        entry: how an entry of a list is named.
     """
-    try:
-        return json.loads(text, object_pairs_hook=_unique)
-    except (ValueError, RecursionError) as error:
-        raise BundleError(source, "", f"JSON error: {error}", "strict JSON") from error
+
+    scalar: Callable[[Any, Any, "Place"], Any]
+    error: Any
+    complete: bool = False
+    entry: str = ".{}"
 
 
-def decode(kind: Any, value: Any, source: object, path: str) -> Any:
+@dataclasses.dataclass(frozen=True)
+class Place:
+    """Where a value stands, by which rules, and the range that its field declares."""
+
+    source: object
+    field: str
+    rules: Rules
+    meta: Mapping[str, Any] = dataclasses.field(default_factory=dict)
+
+    def child(self, name: object, meta: Mapping[str, Any] | None = None) -> "Place":
+        """Returns the place of a named value inside this one."""
+        field = f"{self.field}.{_shown(name)}" if self.field else _shown(name)
+        return self._at(field, self.meta if meta is None else meta)
+
+    def entry(self, index: int) -> "Place":
+        """Returns the place of an entry of the list here."""
+        return self._at(self.field + self.rules.entry.format(index), self.meta)
+
+    def error(self, found: object, valid: str) -> Exception:
+        """Returns the error for a value found here."""
+        return self.rules.error(self.source, self.field, found, valid)
+
+    def _at(self, field: str, meta: Mapping[str, Any]) -> "Place":
+        return Place(self.source, field, self.rules, meta)
+
+
+def decode(kind: Any, value: object, place: Place) -> Any:
     """Returns `value` as an instance of the annotation `kind`.
 
     Args:
-        kind: str, int, float, a dataclass of such fields, a tuple, a dict with str
-            keys, or a choice of a tuple, another one of these, and None.
-        value: what `load_json` returned.
-        source: name of the file, for messages.
-        path: the field inside the file, for messages.
+        kind: a scalar, Literal, union, tuple, dict[str, ...] or a dataclass of these.
+        value: mappings, lists and scalars, as read from a file.
+        place: where it stands.
 
     Raises:
-        BundleError: the value does not have exactly this form.
+        Rules.error: the value does not have this form.
     """
     origin, args = typing.get_origin(kind), typing.get_args(kind)
     if dataclasses.is_dataclass(kind):
-        return _record(typing.cast(type, kind), value, source, path)
-    if origin is types.UnionType:
-        return _choice(args, value, source, path)
+        return _record(kind, value, place)
+    if origin in (typing.Union, types.UnionType):
+        return _union(kind, value, place)
+    if origin is typing.Literal:
+        return _literal(args, value, place)
     if origin is tuple:
-        return _sequence(args, value, source, path)
+        return _sequence(kind, value, place)
     if origin is dict:
-        return _mapping(args[1], value, source, path)
-    return _SCALARS[kind](value, source, path)
+        return _mapping(args[1], value, place)
+    return place.rules.scalar(kind, value, place)
 
 
-def nearest(names: Iterable[str], found: str) -> str:
-    """Lists the valid names, and the one that `found` was probably meant to be."""
-    listed = list(names)
-    near = difflib.get_close_matches(found, listed, n=1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
-    return "one of " + ", ".join(listed) + hint
+def _record(cls: Any, value: object, place: Place) -> Any:
+    fields = {f.name: f for f in init_fields(cls)}
+    if not isinstance(value, Mapping):
+        raise place.error(value, f"a mapping of {', '.join(fields)}")
+    for name in value:
+        if name not in fields:
+            valid = one_of(fields, str(name))
+            raise place.child(name).error(_shown(name), valid)
+    kinds, built = _type_hints(cls), {}
+    for name, field in fields.items():
+        inner = place.child(name, field.metadata)
+        optional = not field.default is field.default_factory is dataclasses.MISSING
+        if name in value:
+            built[name] = decode(kinds[name], value[name], inner)
+        elif place.rules.complete or not optional:
+            raise inner.error("", describe(kinds[name], field.metadata))
+    try:
+        return cls(**built)
+    except place.rules.error as error:  # its field is relative to this dataclass
+        inner = place.child(error.field) if error.field else place
+        raise inner.error(error.found, error.valid) from error
+    except ValueError as error:
+        raise place.error(dict(value), str(error)) from error
 
 
-def _choice(kinds: tuple[Any, ...], value: Any, source: object, path: str) -> Any:
-    """Decodes a list as the tuple among the kinds, anything else as the other one."""
-    if value is None:
+def _shown(name: object) -> str:
+    return str(name) if str(name).isprintable() else ascii(name)
+
+
+def _union(kind: Any, value: object, place: Place) -> Any:
+    options = typing.get_args(kind)
+    if value is None and types.NoneType in options:
         return None
-    listed = [kind for kind in kinds if typing.get_origin(kind) is tuple]
-    others = [kind for kind in kinds if kind not in (*listed, types.NoneType)]
-    chosen = listed if listed and isinstance(value, list) else others or listed
-    return decode(chosen[0], value, source, path)
+    fitting = [option for option in options if _has_shape(option, value)]
+    for option in fitting[:-1]:
+        with contextlib.suppress(place.rules.error):
+            return decode(option, value, place)
+    if not fitting:
+        raise place.error(value, describe(kind, place.meta))
+    return decode(fitting[-1], value, place)
 
 
-def _record(cls: type, value: Any, source: object, path: str) -> Any:
-    hints = typing.get_type_hints(cls)
-    table = _object(value, source, path)
-    for name in table:
-        if name not in hints:
-            where = _join(path, name)
-            raise BundleError(source, where, "an unknown key", nearest(hints, name))
-    for name in hints:
-        if name not in table:
-            raise BundleError(source, _join(path, name), "no such key", "a value")
-    return cls(
-        **{n: decode(k, table[n], source, _join(path, n)) for n, k in hints.items()}
-    )
+def _has_shape(kind: Any, value: object) -> bool:
+    """Returns whether `kind` is the sort of container (or scalar) that `value` is."""
+    if dataclasses.is_dataclass(kind) or typing.get_origin(kind) is dict:
+        return isinstance(value, Mapping)
+    if typing.get_origin(kind) is tuple:
+        return isinstance(value, list | tuple)
+    return kind is not types.NoneType and not isinstance(value, Mapping | list | tuple)
 
 
-def _sequence(args: tuple[Any, ...], value: Any, source: object, path: str) -> tuple:
-    if not isinstance(value, list):
-        raise BundleError(source, path, _kind(value), "a list")
-    if args[-1] is not ... and len(value) != len(args):
-        raise BundleError(source, path, f"{len(value)} entries", f"{len(args)} entries")
-    return tuple(
-        decode(args[0], v, source, f"{path}[{i}]") for i, v in enumerate(value)
-    )
+def _literal(valid: tuple[Any, ...], value: object, place: Place) -> Any:
+    for choice in valid:
+        if type(choice) is type(value) and choice == value:
+            return choice
+    raise place.error(value, one_of(map(str, valid), str(value)))
 
 
-def _mapping(kind: Any, value: Any, source: object, path: str) -> dict[str, Any]:
-    table = _object(value, source, path)
+def _sequence(kind: Any, value: object, place: Place) -> tuple:
+    kinds = typing.get_args(kind)
+    if not isinstance(value, list | tuple):
+        raise place.error(value, describe(kind, place.meta))
+    if kinds[-1] is Ellipsis:
+        kinds = (kinds[0],) * len(value)
+    if len(kinds) != len(value):
+        raise place.error(f"{len(value)} values", describe(kind, place.meta))
+    pairs = enumerate(zip(kinds, value, strict=True))
+    return tuple(decode(inner, item, place.entry(i)) for i, (inner, item) in pairs)
+
+
+def _mapping(kind: Any, value: object, place: Place) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        raise place.error(value, f"a mapping of names to {describe(kind, place.meta)}")
     return {
-        _text(name, source, path): decode(kind, v, source, _join(path, name))
-        for name, v in table.items()
+        decode(str, name, place.child(name)): decode(kind, item, place.child(name))
+        for name, item in value.items()
     }
 
 
-def _object(value: Any, source: object, path: str) -> dict[str, Any]:
-    if not isinstance(value, dict):
-        raise BundleError(source, path, _kind(value), "a JSON object")
-    return value
+def describe(kind: Any, meta: Mapping[str, Any]) -> str:
+    """Says in words what `kind` accepts, within the range that `meta` declares."""
+    origin, args = typing.get_origin(kind), typing.get_args(kind)
+    if origin is typing.Literal:
+        return one_of(map(str, args))
+    if origin in (typing.Union, types.UnionType):
+        return " or ".join(describe(option, meta) for option in args)
+    if origin is tuple:
+        count = "" if args[-1] is Ellipsis else f" of {len(args)}"
+        return f"a list{count}, each {describe(args[0], meta)}"
+    if origin is dict:
+        return f"a mapping of names to {describe(args[1], meta)}"
+    if dataclasses.is_dataclass(kind):
+        return f"a mapping of {', '.join(f.name for f in init_fields(kind))}"
+    words = _WORDS.get(kind, "text" if kind is str else "null")
+    return words + _describe_range(meta) if kind in (int, float) else words
 
 
-def _number(value: Any, source: object, path: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float):
-        raise BundleError(source, path, _kind(value), "a number")
-    try:
-        number = float(value)
-    except OverflowError:
-        number = math.inf
-    if not abs(number) <= _FLOAT32_MAX:
-        raise BundleError(source, path, number, "a finite number that fits float32")
-    return number
+def _describe_range(meta: Mapping[str, Any]) -> str:
+    bounds = [f">= {meta['low']:g}"] if "low" in meta else []
+    bounds += [f"<= {meta['high']:g}"] if "high" in meta else []
+    bounds += [f"[{meta['unit']}]"] if meta.get("unit", "1") != "1" else []
+    return " ".join(["", *bounds])
 
 
-def _integer(value: Any, source: object, path: str) -> int:
-    if isinstance(value, bool) or not isinstance(value, int):
-        raise BundleError(source, path, _kind(value), "an integer")
-    if abs(value) >= 2**63:
-        raise BundleError(source, path, "a huge integer", "an integer below 2^63")
-    return value
+def init_fields(cls: Any) -> list[dataclasses.Field[Any]]:
+    """Returns the fields that a dataclass is made from."""
+    return [field for field in dataclasses.fields(cls) if field.init]
 
 
-def _text(value: Any, source: object, path: str) -> str:
-    if not isinstance(value, str):
-        raise BundleError(source, path, _kind(value), "a text")
-    if not (0 < len(value) <= _MAX_TEXT and value.isascii() and value.isprintable()):
-        valid = f"1 to {_MAX_TEXT} printable ASCII characters"
-        raise BundleError(source, path, ascii(value), valid)
-    return value
-
-
-_SCALARS = {float: _number, int: _integer, str: _text}
-
-
-def _kind(value: Any) -> str:
-    return f"{type(value).__name__} {value!a}"
-
-
-def _join(path: str, name: str) -> str:
-    shown = name if name.isascii() and name.isprintable() else ascii(name)
-    return f"{path}.{shown}" if path else shown
-
-
-def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    table = dict(pairs)
-    if len(table) != len(pairs):
-        names = [name for name, _ in pairs]
-        repeated = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"key {repeated!a} is repeated")
-    return table
+@functools.cache
+def _type_hints(cls: Any) -> dict[str, Any]:
+    return typing.get_type_hints(cls)

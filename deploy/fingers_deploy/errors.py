@@ -1,11 +1,14 @@
-"""The errors of this package: input that is refused, in one sentence."""
+"""Errors that a user can cause: input that is refused in one sentence."""
+
+import difflib
+from collections.abc import Iterable
 
 
 class InputError(ValueError):
-    """A file, an argument or a device is refused, in one sentence.
+    """Bad input: one sentence names the place, what was found and what is valid.
 
     Args:
-        source: the file or argument in which the value stands.
+        source: file, command-line option or argument in which the value stands.
         field: the field inside `source`, dotted; empty when the source as a whole is
             at fault.
         found: what was found there.
@@ -22,7 +25,16 @@ class BundleError(InputError):
     """A policy bundle that cannot be honoured."""
 
 
+def one_of(names: Iterable[str], found: str = "") -> str:
+    """Lists valid names, and the one that `found` was probably meant to be."""
+    listed = list(names)
+    near = difflib.get_close_matches(found, listed, n=1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    return "one of " + ", ".join(listed) + hint
+
+
 def _short(value: object, limit: int = 120) -> str:
-    """Returns `value` on one line, shortened to `limit` characters."""
+    """Returns `value` on one printable line, shortened to `limit` characters."""
     text = " ".join(str(value).split()) or "nothing"
+    text = text if text.isprintable() else ascii(text)[1:-1]
     return text if len(text) <= limit else text[: limit - 1] + "…"

@@ -1,7 +1,7 @@
 """The manifest: what a policy reads, what its output means, where it comes from.
 
 A bundle is understood from this alone. The dataclasses are the schema: every field is
-required, no other is allowed (`fingers_deploy.decode`), and `fingers_deploy.checks`
+required, no other is allowed (`fingers_deploy.strict_json`); `fingers_deploy.checks`
 states what must hold between fields.
 """
 

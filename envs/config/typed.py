@@ -6,13 +6,14 @@ it), `doc`. YAML is read strictly, see `envs.config.strict_yaml`.
 """
 
 import dataclasses
+import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from envs.config.parse import Place, init_fields, parse
 from envs.config.strict_yaml import parse_yaml, write_yaml
 from envs.errors import InputError, one_of
+from fingers_deploy.decode import Place, Rules, decode, describe, init_fields
 
 T = TypeVar("T")
 MAX_YAML_BYTES = 1 << 20
@@ -35,7 +36,7 @@ def from_dict(cls: type[T], data: object, source: object, field: str = "") -> T:
         InputError: unknown or missing field, wrong type, non-finite number, value out
             of range, or a ValueError or InputError (relative) of a `__post_init__`.
     """
-    return parse(cls, data, Place(str(source), field))
+    return decode(cls, data, Place(str(source), field, _RULES))
 
 
 def to_dict(obj: Any) -> Any:
@@ -93,7 +94,8 @@ def _assign(data: Any, field: str, value: object, source: str) -> None:
     """Puts `value` at a dotted path of nested dicts and lists."""
     names = field.split(".")
     for depth, name in enumerate(names):
-        place, rest = Place(source, ".".join(names[: depth + 1])), names[depth + 1 :]
+        rest = names[depth + 1 :]
+        place = Place(source, ".".join(names[: depth + 1]), _RULES)
         inner = range(len(data)) if isinstance(data, list) else data
         keys = {str(k): k for k in inner} if isinstance(data, dict | list) else {}
         if name not in keys and (rest or not isinstance(data, dict)):
@@ -102,3 +104,20 @@ def _assign(data: Any, field: str, value: object, source: str) -> None:
             data[keys.get(name, name)] = value
             return
         data = data[keys[name]]
+
+
+def _scalar(kind: Any, value: Any, place: Place) -> Any:
+    """Accepts a whole number for a float, nothing else of another type."""
+    valid, meta = describe(kind, place.meta), place.meta
+    if kind is float and type(value) is int and abs(value) < 1e300:
+        value = float(value)
+    if type(value) is not kind:
+        raise place.error("nothing" if value is None else repr(value), valid)
+    if kind in (int, float):
+        low, high = meta.get("low", -math.inf), meta.get("high", math.inf)
+        if value in (math.inf, -math.inf) or not low <= value <= high:
+            raise place.error(value, valid)
+    return value
+
+
+_RULES = Rules(_scalar, InputError)
