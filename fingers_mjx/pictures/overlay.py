@@ -91,11 +91,16 @@ def frame_axes(
 ) -> list[Item]:
     """Returns red, green and blue axes of a frame, with names at their ends.
 
+    Axis i ends at p_i = o + length · R e_i [m].
+
     Args:
         origin_w: origin of the frame [m, world].
         rotation_w: columns are the frame's axes in the world.
         length_m: length of the axes.
         names: labels of the three axes.
+
+    Source:
+        Ours; colours as in MuJoCo's viewer.
     """
     ends = origin_w + length_m * rotation_w.T
     items: list[Item] = []

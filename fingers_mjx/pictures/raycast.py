@@ -15,6 +15,7 @@ from jaxtyping import Float, Int, UInt8
 from fingers_mjx.pictures.camera import Camera, pixel_centres, position, rays
 from fingers_mjx.pictures.shade import (
     Look,
+    Surface,
     checkerboard,
     encode,
     fade,
@@ -54,7 +55,10 @@ def render(
     look: Look | None = None,
     samples: int = 2,
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """Returns a picture of the scene.
+    """Returns a picture of the scene, sRGB in [0, 255] [1].
+
+    A pixel is the mean = Σ colours / samples² of rays on a grid inside it; away from
+    edges, where that changes nothing, of one ray.
 
     Args:
         model: the scene; planes become a checkerboard, other geoms take the colour of
@@ -64,6 +68,10 @@ def render(
         size: width and height in pixels.
         look: light and colours; `Look()` if not given.
         samples: edges are drawn with samples x samples rays per pixel; 1 for none.
+
+    Source:
+        Ours; adaptive supersampling after T. Whitted, An Improved Illumination Model
+        for Shaded Display, CACM 1980.
     """
     scene = _Scene(exact(model), data, camera, size, look or Look())
     centres = pixel_centres(size)
@@ -97,12 +105,17 @@ def cast(
 ) -> Hits:
     """Returns what unit rays from one point meet first; geoms of alpha 0 are air.
 
+    Smallest t ≥ 0 [m] with o + t d = a point of a geom.
+
     Args:
         model: the scene, from `exact`.
         data: poses of the geoms.
         origin_w: where all rays start [m].
         rays_w: unit directions.
         groups: geom groups that are not air.
+
+    Source:
+        `mj_multiRay` of MuJoCo.
     """
     count = len(rays_w)
     geom = np.full(count, -1, np.int32)
@@ -122,10 +135,14 @@ def seen_from(
     points_w: Float[np.ndarray, "n 3"],
     groups: tuple[int, ...] = (0, 1, 2),
 ) -> Float[np.ndarray, " n"]:
-    """Returns 1 where nothing stands between a point and the light, else 0.
+    """Returns 1 where nothing stands between a point [m] and the light, else 0 [1].
 
-    Planes cast no shadow: only rays that meet the sphere around all other geoms are
-    tested, which leaves out most of the floor.
+    Planes cast no shadow: only rays d from the light l that meet the sphere (c, r)
+    around all other geoms, ‖c − l‖² − (d·(c − l))² < r², are tested, which spares most
+    of the floor.
+
+    Source:
+        Ours; shadow rays after T. Whitted, CACM 1980.
     """
     ray = points_w - light_w
     length = np.linalg.norm(ray, axis=1)
@@ -143,7 +160,13 @@ def seen_from(
 def bounding_sphere(
     model: mujoco.MjModel, data: mujoco.MjData
 ) -> tuple[Float[np.ndarray, "3"], float]:
-    """Returns centre [m] and radius [m] of a sphere around all geoms but planes."""
+    """Returns centre c [m] and radius r [m] of a sphere around all geoms but planes.
+
+    c = (min x + max x) / 2 of the geoms' centres x, r = max (‖x − c‖ + rbound).
+
+    Source:
+        Ours; not the smallest sphere, but one that is found at once.
+    """
     solid = model.geom_type != PLANE
     if not solid.any():
         return np.zeros(3), 0.0
@@ -153,7 +176,11 @@ def bounding_sphere(
 
 
 def geom_colours(model: mujoco.MjModel) -> Float[np.ndarray, "geoms 3"]:
-    """Returns the sRGB colour of each geom: its own, else that of its material."""
+    """Returns each geom's sRGB colour in [0, 1] [1] = its own, else its material's.
+
+    Source:
+        MuJoCo's XML reference: rgba of a geom counts where it is not the default.
+    """
     own, material = model.geom_rgba[:, :3], model.geom_matid
     if model.nmat == 0:
         return own.copy()
@@ -163,10 +190,15 @@ def geom_colours(model: mujoco.MjModel) -> Float[np.ndarray, "geoms 3"]:
 
 
 def lamps(look: Look) -> tuple[Float[np.ndarray, "k 3"], Float[np.ndarray, "s 3"]]:
-    """Returns unit directions towards samples of the key light and of the sky dome.
+    """Returns unit directions [1] towards samples of the key light and of the sky dome.
 
-    The key light is a disc and the dome a cosine-weighted hemisphere, both sampled on
-    a Fibonacci spiral, so that the same picture comes out every time.
+    The key light is a disc and the dome a cosine-weighted hemisphere, z = √(1 − x² −
+    y²) over the unit disc, not below 0.15; both are sampled on a Fibonacci spiral, so
+    that the same picture comes out every time.
+
+    Source:
+        Malley's method for the dome; H. Vogel, A Better Way to Construct the Sunflower
+        Head, Mathematical Biosciences 1979, for the spiral.
     """
     toward = unit(np.asarray(look.light_w, float))
     side = unit(np.cross(toward, [0.0, 1.0, 0.0]))
@@ -206,7 +238,8 @@ class _Scene:
         albedo[floor] = checkerboard(self.look, points[floor])
         gloss = np.where(floor, 0.0, self.look.gloss)
         seen = [self._seen(points, lamp) for lamp in lamps(self.look)]
-        light = lit(self.look, albedo, gloss, normals, rays_w, *seen)
+        surface = Surface(albedo, gloss, normals)
+        light = lit(self.look, surface, rays_w, *seen)
         far = np.linalg.norm(points - self.camera.lookat_w, axis=1)
         return fade(self.look, light, np.where(floor, far, 0.0))
 

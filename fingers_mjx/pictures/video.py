@@ -34,6 +34,8 @@ def follow(
 ) -> list[Camera]:
     """Returns one camera per frame that keeps a body in view without shaking.
 
+    lookat_t = lookat + Σ_s g(t − s) position_s on the floor, Gaussian g.
+
     The look-at point moves with the body's path over the floor after a Gaussian filter
     of width `smooth_s`, which looks both ways and so has no lag; its height stays
     where `camera` has it, so that bobbing of the body remains visible.
@@ -43,7 +45,10 @@ def follow(
             (smoothed) place on the floor.
         positions_w: the body in each frame [m].
         fps: frames per second.
-        smooth_s: standard deviation of the filter.
+        smooth_s: standard deviation of the filter [s].
+
+    Source:
+        Ours.
     """
     flat, width = positions_w[:, :2], smooth_s * fps
     path = np.asarray(gaussian_filter1d(flat, width, axis=0, mode="nearest"))
