@@ -1,8 +1,6 @@
 """`fingers demo`: everything once, on the CPU, into one report."""
 
 import argparse
-import sys
-from functools import partial
 from pathlib import Path
 
 from fingers_mjx.cli.options import add_command, add_path, check_directory
@@ -30,18 +28,10 @@ def add(commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Runs the demonstration; progress and the place of the report go to stdout."""
-    from fingers_mjx.cli.output import counting
     from fingers_mjx.demo.demo import POLICY_DIR, demo
-    from fingers_mjx.demo.screen import Screen
-    from fingers_mjx.training.progress import reporter
 
     check_directory("--out", args.out)
-    screen = Screen(
-        say=partial(print, flush=True),
-        counting=partial(counting, sys.stdout),
-        reporting=partial(reporter, sys.stdout),
-    )
     command = f"fingers demo --out {args.out}"
     command += f" --policy {args.policy}" if args.policy else ""
-    print(f"report: {demo(args.out, args.policy or POLICY_DIR, screen, [command])}")
+    print(f"report: {demo(args.out, args.policy or POLICY_DIR, [command])}")
     return 0

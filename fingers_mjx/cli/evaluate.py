@@ -60,9 +60,10 @@ def add(commands) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Evaluates; the table goes to stdout, progress to stderr."""
-    from fingers_mjx.cli.output import counting, keep_summary, print_measures
+    from fingers_mjx.cli.output import keep_summary, print_measures
     from fingers_mjx.evaluation import source as evaluation
     from fingers_mjx.policy.source import is_run, load_source
+    from fingers_mjx.training.counting import counting
 
     backend = backend_of(args)
     if len(args.commands or ()) > 1:

@@ -103,13 +103,14 @@ def _add_keys(parser) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Plays; the table goes to stdout, progress to stderr."""
-    from fingers_mjx.cli.output import counting, keep_summary, print_measures
+    from fingers_mjx.cli.output import keep_summary, print_measures
     from fingers_mjx.evaluation.source import document
     from fingers_mjx.play.episodes import play_episodes
     from fingers_mjx.play.keyboard import KeyPlayer, keys_story
     from fingers_mjx.play.recovery import RecoveryPlayer, story
     from fingers_mjx.play.video import VIDEO_SUFFIXES
     from fingers_mjx.policy.source import PolicySource, load_bundle_setup
+    from fingers_mjx.training.counting import counting
 
     if args.video and args.video.suffix not in VIDEO_SUFFIXES:
         valid = one_of(VIDEO_SUFFIXES)
@@ -235,9 +236,9 @@ def _film(
     args: argparse.Namespace, bundle: Bundle, player: Player, played: Session
 ) -> None:
     """Draws the first episode."""
-    from fingers_mjx.cli.output import counting
     from fingers_mjx.play.keyboard_video import write_keyboard_video
     from fingers_mjx.play.video import Film, write_video
+    from fingers_mjx.training.counting import counting
 
     args.video.parent.mkdir(parents=True, exist_ok=True)
     with counting(sys.stderr, "drawing", "frames") as progress:

@@ -4,9 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from fingers_mjx.demo.learn import LearnSize, default_size, learn
+from fingers_mjx.demo.learn import LearnSize, learn
 from fingers_mjx.demo.report import write_demo_report
-from fingers_mjx.demo.screen import Screen
 from fingers_mjx.demo.show import ShowSize, show
 from fingers_mjx.policy.source import PolicySource, load_bundle_setup
 
@@ -19,22 +18,20 @@ class DemoSize:
     """How much of everything."""
 
     show: ShowSize = field(default_factory=ShowSize)
-    learn: LearnSize = field(default_factory=default_size)
+    learn: LearnSize = field(default_factory=LearnSize)
 
 
 def demo(
     out: Path,
     bundle_dir: Path,
-    screen: Screen,
     commands: Sequence[str] = (),
     size: DemoSize | None = None,
 ) -> Path:
-    """Runs the demonstration and returns its report.
+    """Runs the demonstration and returns its report; progress goes to stdout.
 
     Args:
         out: directory for everything; made if missing.
         bundle_dir: policy to evaluate and play.
-        screen: where progress goes.
         commands: that made it, for the report.
         size: how much of everything; minutes on two cores if not given.
 
@@ -46,6 +43,6 @@ def demo(
     trained_steps = bundle.manifest.provenance.normalizer.steps
     source = PolicySource(bundle_dir, setup, bundle.network, trained_steps)
     out.mkdir(parents=True, exist_ok=True)
-    shown = show(out, bundle, source, screen, size.show)
-    learned = learn(out, screen, size.learn)
+    shown = show(out, bundle, source, size.show)
+    learned = learn(out, size.learn)
     return write_demo_report(out / "report.html", shown, learned, commands)

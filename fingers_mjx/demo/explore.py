@@ -82,7 +82,7 @@ def explore(
         noise_std: standard deviation of the noise on its actions.
         steps: longest episode in control steps.
         seed: of worlds, commands and noise.
-        progress: told (steps done, steps in all).
+        progress: called with (steps done, steps in all).
     """
     return evaluate(
         Exploring(env, noise_std),

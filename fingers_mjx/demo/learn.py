@@ -1,7 +1,9 @@
 """The learning part of the demonstration: before, the run, after, export."""
 
+import sys
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,6 @@ import jax
 
 from envs.batch import BatchEnv
 from fingers_mjx.demo.explore import explore
-from fingers_mjx.demo.screen import Screen, timed
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.export.export import ExportReport, brax_weights
 from fingers_mjx.export.run import export_run
@@ -17,11 +18,9 @@ from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import init_train_state, make_learner
-from fingers_mjx.runs.setup import (
-    Setup,
-    make_env,
-    new_setup,
-)
+from fingers_mjx.runs.setup import Setup, make_env, new_setup
+from fingers_mjx.training.counting import counting, timed
+from fingers_mjx.training.progress import reporter
 from fingers_mjx.training.train import train
 
 SEED = 1
@@ -33,11 +32,11 @@ class LearnSize:
     """How much is learned.
 
     Attributes:
-        train: settings of the run.
+        train: settings of the run; by default minutes on two cores.
         episodes, steps: of the evaluations before and after.
     """
 
-    train: TrainConfig
+    train: TrainConfig = field(default_factory=partial(preset, "cpu"))
     episodes: int = 64
     steps: int = 500
 
@@ -61,31 +60,25 @@ class Learned:
     export: ExportReport
 
 
-def default_size() -> LearnSize:
-    """Returns the run that shows learning within minutes on two cores."""
-    return LearnSize(preset("cpu"))
-
-
-def learn(out: Path, screen: Screen, size: LearnSize) -> Learned:
+def learn(out: Path, size: LearnSize) -> Learned:
     """Trains a policy, measures what it has learned and exports it.
 
     Args:
         out: directory in which a new run directory is made.
-        screen: where progress goes.
         size: how much of everything.
     """
     setup = new_setup(size.train, None)
     env = make_env(setup, size.train.num_envs, size.train.backend)
     run_dir = out / time.strftime("run-%Y%m%d-%H%M%S")
     start_s = time.monotonic()
-    with timed(screen, "4/5 learning on this machine, from nothing"):
-        _train(run_dir, setup, env, screen)
+    with timed("4/5 learning on this machine, from nothing"):
+        _train(run_dir, setup, env)
     trained_s = time.monotonic() - start_s
-    with timed(screen, "5/5 what it has learned, and its export"):
+    with timed("5/5 what it has learned, and its export"):
         trained = load_policy(run_dir)
         first, noise = untrained(setup, env), setup.train.ppo.init_noise_std
-        before = _measure(setup, first, noise, screen, size)
-        after = _measure(setup, trained, trained.noise_std, screen, size)
+        before = _measure(setup, first, noise, size)
+        after = _measure(setup, trained, trained.noise_std, size)
         report = export_run(run_dir, run_dir)
     return Learned(run_dir, before, after, trained_s, report)
 
@@ -98,14 +91,14 @@ def untrained(setup: Setup, env: BatchEnv) -> Network:
     return brax_weights(state.params.policy, state.normalizer, clip)
 
 
-def _train(run_dir: Path, setup: Setup, env: BatchEnv, screen: Screen) -> None:
-    with screen.reporting() as show:
+def _train(run_dir: Path, setup: Setup, env: BatchEnv) -> None:
+    with reporter(sys.stdout) as show:
         train(env, setup, run_dir, identity=identity(env), on_progress=show)
 
 
 def _measure(
-    setup: Setup, network: Network, noise_std: Any, screen: Screen, size: LearnSize
+    setup: Setup, network: Network, noise_std: Any, size: LearnSize
 ) -> EpisodeTable:
     env = make_env(setup, size.episodes, "cpu", auto_reset=False)
-    with screen.counting("evaluating", "steps") as count:
+    with counting(sys.stdout, "evaluating", "steps") as count:
         return explore(env, network, noise_std, size.steps, SEED, count)

@@ -1,10 +1,10 @@
 """The showing part of the demonstration: a given policy, measured and filmed."""
 
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
 from fingers_deploy import Bundle
-from fingers_mjx.demo.screen import Screen, timed
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.source import (
     document,
@@ -17,6 +17,7 @@ from fingers_mjx.play.player import Player
 from fingers_mjx.play.video import Film, write_video
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.runs.setup import make_env
+from fingers_mjx.training.counting import counting, timed
 
 FILM = ((0.16, 0.0, 0.0), (0.10, 0.12, 0.0), (0.0, 0.0, 0.45), (0.16, 0.0, 0.0))
 """Commands of the video: ahead, to the left, turning, ahead."""
@@ -59,54 +60,47 @@ class Shown:
     video: Path
 
 
-def show(
-    out: Path, bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
-) -> Shown:
+def show(out: Path, bundle: Bundle, source: PolicySource, size: ShowSize) -> Shown:
     """Evaluates, plays and films a policy.
 
     Args:
         out: directory for evaluation and video.
         bundle: the policy for the shim.
         source: the same for the environment.
-        screen: where progress goes.
         size: how much of everything.
     """
-    with timed(screen, f"1/5 {source.name} in {size.episodes} randomized episodes"):
-        simulated = _evaluate(out, source, screen, size)
-    with timed(screen, "2/5 the same episodes in C MuJoCo, through the shim"):
-        played = _play(bundle, source, screen, size)
-    with timed(screen, "3/5 a video of the nominal hand"):
-        film, video = _film(out, bundle, source, screen, size)
+    with timed(f"1/5 {source.name} in {size.episodes} randomized episodes"):
+        simulated = _evaluate(out, source, size)
+    with timed("2/5 the same episodes in C MuJoCo, through the shim"):
+        played = _play(bundle, source, size)
+    with timed("3/5 a video of the nominal hand"):
+        film, video = _film(out, bundle, source, size)
     return Shown(source, simulated, played, film, video)
 
 
-def _evaluate(
-    out: Path, source: PolicySource, screen: Screen, size: ShowSize
-) -> EpisodeTable:
-    with screen.counting("evaluating", "steps") as count:
+def _evaluate(out: Path, source: PolicySource, size: ShowSize) -> EpisodeTable:
+    with counting(sys.stdout, "evaluating", "steps") as count:
         table = evaluate_source(source, size.episodes, steps=size.steps, progress=count)
     summary = document(source, table, 0, {"backend": "cpu", "steps": size.steps})
     write_evaluation(out / "evaluation", table, summary)
     return table
 
 
-def _play(
-    bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
-) -> Session:
+def _play(bundle: Bundle, source: PolicySource, size: ShowSize) -> Session:
     player = Player(make_env(source.setup, 1, "cpu"), bundle)
     steps = size.steps or player.env.episode_length
-    with screen.counting("playing", "episodes") as count:
+    with counting(sys.stdout, "playing", "episodes") as count:
         return play_episodes(player, size.episodes, steps, progress=count)
 
 
 def _film(
-    out: Path, bundle: Bundle, source: PolicySource, screen: Screen, size: ShowSize
+    out: Path, bundle: Bundle, source: PolicySource, size: ShowSize
 ) -> tuple[Session, Path]:
     player = Player(make_env(nominal(source.setup), 1, "cpu"), bundle)
     steps = round(size.film_s / player.env.dt)
     film = play_episodes(player, 1, steps, schedule=schedule_of(FILM, steps))
     path = out / "walk.mp4"
-    with screen.counting("drawing", "frames") as count:
+    with counting(sys.stdout, "drawing", "frames") as count:
         how = Film(path, size.fps, size.width, count)
         write_video(how, player.env, film.first)
     return film, path

@@ -46,7 +46,7 @@ def play_episodes(
         steps: control steps of each.
         seed: of the worlds.
         schedule: a command for each step; drawn as in training if not given.
-        progress: told (episodes played, episodes in all).
+        progress: called with (episodes played, episodes in all).
     """
     keys = jax.random.split(jax.random.fold_in(jax.random.key(seed), 0), episodes)
     played = []

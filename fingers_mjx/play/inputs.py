@@ -18,7 +18,7 @@ from fingers_deploy.tracking import Frame, ObjectTracker
 class PlayInputs:
     """Inputs of one episode after another.
 
-    What an operator gives is taken from the memory; what a camera tells goes through
+    What an operator gives is taken from the memory; what a camera measures goes through
     the shim's own tracker.
 
     Args:
@@ -35,23 +35,23 @@ class PlayInputs:
             target_w = np.append(np.asarray(memory.task.target_w), HALF_M)
             self._tracker = ObjectTracker(target_w, self._env.stance.q_off)
 
-    def read(self, memory: Memory, told: Sample) -> Float[np.ndarray, " inputs"]:
+    def read(self, memory: Memory, seen: Sample) -> Float[np.ndarray, " inputs"]:
         """Returns the inputs of a control step, term after term.
 
         Args:
             memory: before the step.
-            told: what the sensors tell.
+            seen: what the sensors measure.
         """
         if self._tracker is None:
             terms = self._env.input_terms
-            return np.concatenate([np.asarray(told.inputs[t.name]) for t in terms])
+            return np.concatenate([np.asarray(seen.inputs[t.name]) for t in terms])
         self._tracker.update(_frame(memory.task))
-        return self._tracker.inputs(np.asarray(told.gravity))
+        return self._tracker.inputs(np.asarray(seen.gravity))
 
 
 def _frame(task: PushMemory) -> Frame:
     """Returns the sample that the simulated camera delivers."""
-    seen: Any = jax.device_get(read_camera(task.camera))
+    frame: Any = jax.device_get(read_camera(task.camera))
     return Frame(
-        float(seen.t_s), seen.object_pos_w, seen.root_pos_w, float(seen.heading_rad)
+        float(frame.t_s), frame.object_pos_w, frame.root_pos_w, float(frame.heading_rad)
     )

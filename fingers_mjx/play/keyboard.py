@@ -14,7 +14,7 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.memory import Memory
-from envs.physics import PhysicsState
+from envs.observations import Sample
 from envs.tasks.keyboard.model import KEY_NAMES
 from envs.tasks.keyboard.requests import IDLE
 from fingers_deploy import Bundle
@@ -31,8 +31,6 @@ from fingers_robot.behaviour.keys import (
     begin_keys,
     keys_step,
 )
-
-TASK = "keyboard"
 
 
 @dataclass(frozen=True)
@@ -102,31 +100,22 @@ class KeyPlayer(Player):
         return dataclasses.replace(start, memory=_asking(start.memory, self._state))
 
     def _noted(self, memory: Memory, row: Trace) -> tuple[Memory, Trace]:
-        """Passes what was pressed to the shim, and its request to the environment."""
+        """Passes what was pressed to the robot, and what it asks for to the task."""
         pressed = pressed_in(row)
         self._pressed += pressed
         time_s = float(memory.steps) * self.env.dt
-        before, self._state = (
-            self._state,
-            keys_step(self._state, pressed, time_s, self.times),
-        )
-        waited = int(memory.task.requests.steps)
-        same = before.since_s == self._state.since_s
-        return _asking(memory, self._state, waited if same else 0), row
+        since_s = self._state.since_s
+        self._state = keys_step(self._state, pressed, time_s, self.times)
+        same = since_s == self._state.since_s
+        waited = int(memory.task.requests.steps) if same else 0
+        return _asking(memory, self._state, waited), row
 
-    def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
-        """Asks the shim, which reads what the sensors measure."""
-        sensed = self._read(memory, state)
-        reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
-        joint_pos = np.asarray(sensed.joint_pos) + reference
+    def _task_inputs(
+        self, memory: Memory, seen: Sample, joint_pos: Float[np.ndarray, "20"]
+    ) -> Float[np.ndarray, " inputs"]:
         v_quat_b = self.controller.bundle.manifest.interface.v_quat_b
         tip_v = pressing_fingertip(joint_pos, v_quat_b)
-        return self.controller.step(
-            joint_pos,
-            np.asarray(sensed.gravity),
-            np.asarray(sensed.angvel),
-            np.concatenate([self._state.request, tip_v]),
-        )
+        return np.concatenate([self._state.request, tip_v])
 
 
 def pressed_in(row: Trace) -> tuple[str, ...]:

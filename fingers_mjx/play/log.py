@@ -1,7 +1,7 @@
 """Measured logs of a hand that walks in C MuJoCo under the deployment shim.
 
 What a host would write of the real hand: targets, encoders, effort, IMU, and the pose
-of the palm as a camera above tells it, relative to the floor.
+of the palm as a camera above measures it, relative to the floor.
 """
 
 from dataclasses import dataclass
@@ -43,19 +43,19 @@ class WalkRecorder(Player):
     """A player that also keeps what a host would log of every control step."""
 
     def play(self, key: Array, steps: int, schedule: Schedule | None = None) -> Played:
-        """Plays one episode; `log` then tells of it."""
+        """Plays one episode; `log` then returns its log."""
         self.rows: list[dict[str, np.ndarray]] = []
         return super().play(key, steps, schedule)
 
     def _target(self, memory: Any, state: PhysicsState) -> Float[np.ndarray, "20"]:
         target = super()._target(memory, state)
-        told: Any = jax.device_get(self._read(memory, state))
+        seen: Any = jax.device_get(self._read(memory, state))
         reference = np.asarray(self.env.stance.joint_pos_rad)
         row = {
             "cmd": np.array(target, float),
-            "pos": told.joint_pos + reference,
-            "gravity": told.gravity,
-            "gyro": told.angvel,
+            "pos": seen.joint_pos + reference,
+            "gravity": seen.gravity,
+            "gyro": seen.angvel,
             "base": np.asarray(state.qpos[:7], float),
             "tau": self.rows[-1]["after"] if self.rows else np.full(20, np.nan),
         }

@@ -2,7 +2,7 @@
 
 `mujoco.mj_step` moves one hand, `fingers_deploy.PolicyController` moves its targets, as
 it would on the real hand. Of the training environment only the definitions are used:
-how worlds are drawn, the drive between target and servo, what the sensors tell, and
+how worlds are drawn, the drive between target and servo, what the sensors measure, and
 when a hand has fallen. Physics runs in float64 and never through JAX.
 """
 
@@ -108,15 +108,22 @@ class Player:
         return self.controller.action
 
     def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
-        """Asks the shim, which is told what the sensors tell."""
-        told = self._read(memory, state)
+        """Returns what the shim makes of what the sensors measure."""
+        seen = self._read(memory, state)
         reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
+        joint_pos = np.asarray(seen.joint_pos) + reference
         return self.controller.step(
-            np.asarray(told.joint_pos) + reference,
-            np.asarray(told.gravity),
-            np.asarray(told.angvel),
-            self._inputs.read(memory, told),
+            joint_pos,
+            np.asarray(seen.gravity),
+            np.asarray(seen.angvel),
+            self._task_inputs(memory, seen, joint_pos),
         )
+
+    def _task_inputs(
+        self, memory: Memory, seen: Sample, joint_pos: Float[np.ndarray, "20"]
+    ) -> Float[np.ndarray, " inputs"]:
+        del joint_pos
+        return self._inputs.read(memory, seen)
 
     def _reading(self, memory: Memory, state: PhysicsState) -> Sample:
         return self.env.sample(state, vars(memory))

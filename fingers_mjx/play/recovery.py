@@ -58,7 +58,7 @@ class RecoveryPlayer(Player):
 
 
 def is_recovery(bundle: Bundle) -> bool:
-    """Whether the shim ends the bundle's episodes as recoveries."""
+    """Whether the robot ends the bundle's episodes as recoveries."""
     return bundle.manifest.task == RECOVERY
 
 

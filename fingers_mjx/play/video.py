@@ -8,16 +8,22 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.batch import BatchEnv
+from envs.tasks.push.measures import STAY_M
 from fingers_mjx.pictures.camera import Camera
-from fingers_mjx.pictures.overlay import caption
+from fingers_mjx.pictures.overlay import Line, caption, draw
 from fingers_mjx.pictures.video import Frame, follow, frames, write_animation, write_mp4
 from fingers_mjx.play.player import Played
-from fingers_mjx.play.target import Target, target_of, with_target
+from rewards.pushing import DELIVERED_M
 
 VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16
 AHEAD_M = 0.06
 """From the palm's origin to the middle of the hand."""
+ABOVE_FLOOR_M = 0.001
+RINGS = ((DELIVERED_M, (200, 60, 30)), (STAY_M, (120, 120, 120)))
+"""Around a target: within them a delivery ends, and stays."""
+
+Target = Float[np.ndarray, "2"] | None
 
 
 @dataclass(frozen=True)
@@ -61,12 +67,14 @@ def write_video(film: Film, env: BatchEnv, played: Played) -> Path:
         played: the episode.
     """
     steps = frame_steps(len(played.qpos), env.dt, film.fps)
-    qpos, target_w = played.qpos[steps], target_of(played)
+    qpos, target_w = played.qpos[steps], _target(played)
     cameras = follow(_view(qpos[0], target_w), qpos[:, :3], film.fps)
     pictures = frames(env.mj_model, qpos, cameras, (film.width, film.height))
-    marked = with_target(pictures, cameras, target_w)
+    if target_w is not None:
+        rings = [_ring(target_w, *ring) for ring in RINGS]
+        pictures = (draw(p, c, rings) for p, c in zip(pictures, cameras, strict=True))
     texts = [_text(played, step, env.dt) for step in steps]
-    return film.write(map(caption, marked, texts), len(texts))
+    return film.write(map(caption, pictures, texts), len(texts))
 
 
 def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
@@ -74,6 +82,20 @@ def frame_steps(poses: int, dt_s: float, fps: float) -> np.ndarray:
     count = max(1, round((poses - 1) * dt_s * fps))
     steps = np.rint(np.arange(count) / (fps * dt_s)).astype(int)
     return np.minimum(steps, poses - 1)
+
+
+def _target(played: Played) -> Target:
+    """Returns where the object is to go [m], None in tasks without a target."""
+    found = played.trace.extra.get("target_w")
+    return None if found is None else np.asarray(found[0])
+
+
+def _ring(target_w: np.ndarray, radius_m: float, colour: tuple[int, int, int]) -> Line:
+    angle = np.linspace(0.0, 2 * np.pi, 49)
+    x = target_w[0] + radius_m * np.cos(angle)
+    y = target_w[1] + radius_m * np.sin(angle)
+    points_w = np.stack([x, y, np.full_like(x, ABOVE_FLOOR_M)], axis=1)
+    return Line(points_w, colour, 1.5, 0.8)
 
 
 def _view(qpos: Float[np.ndarray, " nq"], target_w: Target) -> Camera:

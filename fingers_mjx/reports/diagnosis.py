@@ -1,6 +1,7 @@
 """The page that shows a diagnosis: what differed, why, and what the cause explains."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,8 @@ from fingers_mjx.reports.page import (
 )
 from sysid.diagnosis.diagnose import Examined
 from sysid.diagnosis.replay.residuals import sample_rows
+from sysid.diagnosis.replay.track import JointTrack
+from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Diagnosis
 
@@ -25,7 +28,32 @@ SHOWN_S = 12.0
 UNITS = {"speed": "rad/s, m/s", "angle": "rad, m", "effort": "N·m, N", "time": "s"}
 """Units of what a residual may depend on, of turning and sliding joints."""
 
-BEFORE, AFTER, MEASURED = "#c44e52", "#4c72b0", "#222222"
+KINDS = ("controller", "mechanics")
+COLOURS = {"before": "#c44e52", "after": "#4c72b0"}
+MEASURED = "#222222"
+
+
+@dataclass(frozen=True, eq=False)
+class _Joint:
+    """One joint and what is drawn of it.
+
+    Attributes:
+        track: its measured motion.
+        problem: residuals and weights.
+        thetas: parameters before and after.
+        raw: residuals (controller, mechanics) under both.
+        rows: steps at which residuals are sampled.
+        piece: the piece that is drawn.
+        window: the steps that are drawn, where the error is largest.
+    """
+
+    track: JointTrack
+    problem: Problem
+    thetas: np.ndarray
+    raw: tuple[np.ndarray, ...]
+    rows: np.ndarray
+    piece: int
+    window: slice
 
 
 def write_diagnosis_report(
@@ -41,7 +69,7 @@ def write_diagnosis_report(
     sections = [Section("Verdict", _verdict(diagnosis))]
     shown = [e for e in examined if e.search is not None]
     shown.sort(key=lambda e: -len(e.search.best.effects) if e.search else 0)
-    sections += [Section(f"Joint {e.track.joint}", _joint(e)) for e in shown[:3]]
+    sections += [Section(f"Joint {e.track.joint}", _pictures(e)) for e in shown[:3]]
     if diagnosis.warnings or diagnosis.unexplained:
         lines = [*diagnosis.warnings, *diagnosis.unexplained]
         sections.append(Section("Warnings", [Note("\n".join(lines))]))
@@ -51,7 +79,7 @@ def write_diagnosis_report(
 
 
 def _verdict(diagnosis: Diagnosis) -> list:
-    """Words, causes, gains and rivals."""
+    """Summary, causes, gains and alternatives."""
     blocks: list = [Note(diagnosis.summary)]
     if diagnosis.next_experiment:
         blocks.append(Note(f"Record next. {diagnosis.next_experiment}"))
@@ -62,7 +90,7 @@ def _verdict(diagnosis: Diagnosis) -> list:
             for name, e in c.parameters.items()
         ]
         header = ("cause", "where", "parameter", "value", "95 % low", "95 % high",
-                  "unit", "evidence [nat]")  # fmt: skip
+                  "unit", "log-likelihood gain")  # fmt: skip
         blocks.append(Table(header, rows, "Causes in order of gain."))
     if diagnosis.residual_gains:
         rows = [
@@ -79,56 +107,54 @@ def _verdict(diagnosis: Diagnosis) -> list:
             (a.effect, a.score_gap, "yes" if a.distinguishable else "no")
             for a in diagnosis.alternatives
         ]
-        header = ("instead", "worse by [nat]", "told apart")
-        blocks.append(Table(header, rows, "Rivals of the first cause."))
+        header = ("instead", "log-likelihood lost", "distinguishable")
+        blocks.append(Table(header, rows, "Alternatives to the first cause."))
     if diagnosis.not_observable:
         names = ", ".join(diagnosis.not_observable)
         blocks.append(Note(f"These records could not have shown: {names}."))
     return blocks
 
 
-def _joint(one: Examined) -> list[Picture]:
+def _pictures(one: Examined) -> list[Picture]:
     """Measured against simulated, residuals, and what they depend on."""
-    assert one.search is not None and one.problem is not None
+    joint = _joint(one)
     return [
-        picture(_angles(one), "Measured and simulated angle, and their difference."),
-        picture(_residuals(one), "Residuals on the measured motion, before and after."),
-        picture(_features(one), "What the residual depends on: means over bins."),
+        picture(_angles(joint), "Measured and simulated angle, and their difference."),
+        picture(
+            _residuals(joint), "Residuals on the measured motion, before and after."
+        ),
+        picture(_features(joint), "What the residual depends on: means over bins."),
     ]
 
 
-def _window(one: Examined) -> tuple[int, slice]:
-    """Returns the piece and the steps that are drawn: where the error is largest."""
+def _joint(one: Examined) -> _Joint:
+    """Finds the piece and the steps where the error before is largest."""
     assert one.problem is not None and one.search is not None
-    raw = one.problem.raw(one.search.base.fit.theta[None], weigh=False)[0]
-    size = (raw**2).sum(0)
-    piece = int(np.argmax(size.sum(0)))
+    thetas = np.stack([m.fit.theta for m in (one.search.base, one.search.best)])
+    raw = tuple(one.problem.raw(theta[None], weigh=False)[0] for theta in thetas)
+    size = (raw[0] ** 2).sum(0)
+    piece, count = int(np.argmax(size.sum(0))), len(one.track.track.cmd)
     steps = round(SHOWN_S / one.track.dt)
-    every = max(1, (len(one.track.track.cmd) - steps) // 20)
-    starts = list(range(0, max(1, len(one.track.track.cmd) - steps), every))
-    rows = sample_rows(len(one.track.track.cmd))
+    starts = range(0, max(1, count - steps), max(1, (count - steps) // 20))
+    rows = sample_rows(count)
     inside = [size[(rows >= s) & (rows < s + steps), piece].sum() for s in starts]
     first = starts[int(np.argmax(inside))]
-    return piece, slice(first, first + steps)
+    window = slice(first, first + steps)
+    return _Joint(one.track, one.problem, thetas, raw, rows, piece, window)
 
 
-def _angles(one: Examined) -> Figure:
+def _angles(joint: _Joint) -> Figure:
     """Closed loop: target, measured and simulated angle; error below."""
-    assert one.problem is not None and one.search is not None
-    piece, window = _window(one)
-    models = (one.search.base, one.search.best)
-    thetas = np.stack([m.fit.theta for m in models])
-    angles = simulated(one.problem, thetas)[:, window, piece]
-    t_s = one.track.dt * np.arange(window.start, window.start + angles.shape[1])
-    measured = np.asarray(one.track.track.pos)[window, piece]
+    track, piece, window = joint.track.track, joint.piece, joint.window
+    angles = simulated(joint.problem, joint.thetas)[:, window, piece]
+    t_s = joint.track.dt * np.arange(window.start, window.start + angles.shape[1])
+    measured = np.asarray(track.pos)[window, piece]
     figure = Figure(figsize=(9, 4.6), layout="constrained")
     top, bottom = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-    target = np.asarray(one.track.track.cmd)[window, piece]
+    target = np.asarray(track.cmd)[window, piece]
     top.plot(t_s, target, ":", color="#999999", label="target")
     top.plot(t_s, measured, color=MEASURED, label="measured")
-    for angle, color, name in zip(
-        angles, (BEFORE, AFTER), ("before", "after"), strict=True
-    ):
+    for angle, (name, color) in zip(angles, COLOURS.items(), strict=True):
         top.plot(t_s, angle, color=color, lw=1, label=f"simulated {name}")
         bottom.plot(t_s, measured - angle, color=color, lw=1)
     top.legend(ncols=4, fontsize=8)
@@ -138,48 +164,41 @@ def _angles(one: Examined) -> Figure:
     return figure
 
 
-def _residuals(one: Examined) -> Figure:
+def _residuals(joint: _Joint) -> Figure:
     """Both residuals, before and after, over time."""
-    assert one.problem is not None and one.search is not None
-    piece, window = _window(one)
-    rows = sample_rows(len(one.track.track.cmd))
+    rows, window = joint.rows, joint.window
     inside = (rows >= window.start) & (rows < window.stop)
     figure = Figure(figsize=(9, 3.6), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
-    for model, color in ((one.search.base, BEFORE), (one.search.best, AFTER)):
-        raw = one.problem.raw(model.fit.theta[None], weigh=False)[0]
-        for k, name in enumerate(("controller", "mechanics")):
-            valid = one.problem.valid[k, inside, piece]
-            shown = np.where(valid, raw[k, inside, piece], np.nan)
-            axes[k].plot(one.track.dt * rows[inside], shown, color=color, lw=1)
+    for raw, color in zip(joint.raw, COLOURS.values(), strict=True):
+        for k, name in enumerate(KINDS):
+            valid = joint.problem.valid[k, inside, joint.piece]
+            shown = np.where(valid, raw[k, inside, joint.piece], np.nan)
+            axes[k].plot(joint.track.dt * rows[inside], shown, color=color, lw=1)
             axes[k].set_ylabel(f"{name}\n[N·m, N]")
     axes[1].set_xlabel("time [s]")
     return figure
 
 
-def _features(one: Examined) -> Figure:
+def _features(joint: _Joint) -> Figure:
     """Conditional means of the residuals over speed, angle, effort and time."""
-    assert one.problem is not None and one.search is not None
-    rows = sample_rows(len(one.track.track.cmd))
-    track = one.track.track
-    time_s = np.broadcast_to((one.track.dt * rows)[:, None], one.track.valid.shape)
+    rows, track = joint.rows, joint.track.track
+    time_s = (joint.track.dt * rows)[:, None]
     features = {
         "speed": np.asarray(track.slow_vel)[rows],
         "angle": np.asarray(track.pos)[rows],
         "effort": np.asarray(track.effort)[rows],
-        "time": time_s,
+        "time": np.broadcast_to(time_s, joint.track.valid.shape),
     }
     figure = Figure(figsize=(9, 4.0), layout="constrained")
     axes = figure.subplots(2, 4, sharey="row")
-    for model, color in ((one.search.base, BEFORE), (one.search.best, AFTER)):
-        raw = one.problem.raw(model.fit.theta[None], weigh=False)[0]
-        for k in range(2):
-            valid = one.problem.valid[k]
+    for raw, color in zip(joint.raw, COLOURS.values(), strict=True):
+        for k, valid in enumerate(joint.problem.valid[:2]):
             for axis, (name, feature) in zip(axes[k], features.items(), strict=True):
                 if valid.any():
                     axis.plot(*_means(feature[valid], raw[k][valid]), color=color)
                 axis.set_xlabel(f"{name} [{UNITS[name]}]", fontsize=8)
-    for k, name in enumerate(("controller", "mechanics")):
+    for k, name in enumerate(KINDS):
         axes[k, 0].set_ylabel(f"{name} [N·m, N]")
     return figure
 

@@ -9,7 +9,8 @@ from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-FINGERS = ("thumb", "index", "middle", "ring", "little")
+from envs.hand.figures import FINGERS
+
 # Okabe and Ito's palette, distinct for colour-blind readers.
 FINGER_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00")
 INK, GREY = "#2b2f36", "#9aa1ab"
@@ -57,9 +58,7 @@ def gait_diagram(
 
 
 def foot_trajectories(
-    tip_pos_v: Float[np.ndarray, "T 5 3"],
-    contact: Bool[np.ndarray, "T 5"],
-    title: str = "Fingertip paths relative to the palm, frame V",
+    tip_pos_v: Float[np.ndarray, "T 5 3"], contact: Bool[np.ndarray, "T 5"]
 ) -> Figure:
     """Draws each fingertip's path from the side (x, z) and from above (x, y).
 
@@ -68,7 +67,6 @@ def foot_trajectories(
     Args:
         tip_pos_v: fingertips relative to the palm in V [m].
         contact: which tips touch, per control step.
-        title: of the figure.
     """
     figure, (side, top) = _figure(2, (7.6, 3.4))
     for tip, (name, colour) in enumerate(zip(FINGERS, FINGER_COLOURS, strict=True)):
@@ -81,22 +79,18 @@ def foot_trajectories(
     top.set(xlabel="x forward [mm]", ylabel="y left [mm]", title="top view")
     side.set_aspect("equal", adjustable="datalim")
     top.set_aspect("equal", adjustable="datalim")
-    figure.suptitle(title, fontsize=10.5)
+    figure.suptitle("Fingertip paths relative to the palm, frame V", fontsize=10.5)
     handles, labels = top.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return figure
 
 
-def tracking(
-    columns: Mapping[str, Float[np.ndarray, " episodes"]],
-    title: str = "Achieved against commanded, one dot per episode",
-) -> Figure:
+def tracking(columns: Mapping[str, Float[np.ndarray, " episodes"]]) -> Figure:
     """Draws speed and turn rate against their commands; the dashed line is ideal.
 
     Args:
         columns: of an episode table; read are command_speed_mps, task_speed_mps,
             command_turn_rate_rad_s and turn_rate_rad_s.
-        title: of the figure.
     """
     figure, (speed, turn) = _figure(2, (7.6, 3.4))
     speeds = columns["command_speed_mps"], columns["task_speed_mps"]
@@ -105,7 +99,7 @@ def tracking(
     _against(turn, *turns, LINES[1])
     speed.set(xlabel="mean commanded speed [m/s]", ylabel="task speed [m/s]")
     turn.set(xlabel="mean commanded turn rate [rad/s]", ylabel="mean turn rate [rad/s]")
-    figure.suptitle(title, fontsize=10.5)
+    figure.suptitle("Achieved against commanded, one dot per episode", fontsize=10.5)
     return figure
 
 
@@ -148,7 +142,6 @@ def training_curves(
     runs: Mapping[str, Sequence[Mapping[str, float]]],
     metrics: Mapping[str, str],
     x: str = "steps",
-    x_label: str = "environment steps",
 ) -> Figure:
     """Draws one panel per metric and one line per run.
 
@@ -158,38 +151,35 @@ def training_curves(
     Args:
         runs: name of a run to its rows of `metrics.jsonl`.
         metrics: key in the rows to label with unit, in the order of panels.
-        x: key of the horizontal axis.
-        x_label: label of the horizontal axis.
+        x: key of the horizontal axis, which counts environment steps.
     """
     figure, panels = _figure(len(metrics), (3.8 * len(metrics), 3.0))
     for axes, (key, label) in zip(panels, metrics.items(), strict=True):
         for (name, rows), colour in zip(runs.items(), _cycle(len(runs)), strict=True):
             points = [(row[x], row[key]) for row in rows if key in row and x in row]
             axes.plot(*np.reshape(points, (-1, 2)).T, color=colour, lw=1.6, label=name)
-        axes.set(xlabel=x_label, ylabel=label)
+        axes.set(xlabel="environment steps", ylabel=label)
     if len(runs) > 1:
         panels[0].legend()
     return figure
 
 
 def standing(
-    failed: Mapping[str, Bool[np.ndarray, "T episodes"]],
-    dt_s: float,
-    title: str = "Episodes without a fall",
+    failed: Mapping[str, Bool[np.ndarray, "T episodes"]], dt_s: float
 ) -> Figure:
     """Draws the fraction of episodes without a fall yet, over time, for each policy.
 
     Args:
         failed: name of a policy to whether each episode failed in each step.
         dt_s: control interval.
-        title: of the figure.
     """
     figure, (axes,) = _figure(1, (7.6, 2.8))
     for (name, fell), colour in zip(failed.items(), _cycle(len(failed)), strict=True):
-        left = 1.0 - np.maximum.accumulate(fell, axis=0).mean(axis=1)
-        time = dt_s * (1 + np.arange(len(left)))
-        axes.plot(time, 100 * left, color=colour, lw=1.8, label=name)
-    axes.set(xlabel="time [s]", ylabel="standing [%]", ylim=(-3, 103), title=title)
+        share = 1.0 - np.maximum.accumulate(fell, axis=0).mean(axis=1)
+        time = dt_s * (1 + np.arange(len(share)))
+        axes.plot(time, 100 * share, color=colour, lw=1.8, label=name)
+    axes.set(xlabel="time [s]", ylabel="standing [%]", ylim=(-3, 103))
+    axes.set_title("Episodes without a fall")
     axes.legend()
     return figure
 

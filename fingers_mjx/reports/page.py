@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import jinja2
 from matplotlib.figure import Figure
@@ -56,23 +56,14 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A picture as a `data:` address; make it with `picture`."""
+    """A picture or video as a `data:` address; make it with `picture` or `video`."""
 
     uri: str
     caption: str = ""
-    kind: ClassVar[str] = "picture"
+    kind: Literal["picture", "video"] = "picture"
 
 
-@dataclass(frozen=True)
-class Video:
-    """A video as a `data:` address; make it with `video`."""
-
-    uri: str
-    caption: str = ""
-    kind: ClassVar[str] = "video"
-
-
-Block = Note | Commands | Table | Picture | Video
+Block = Note | Commands | Table | Picture
 
 
 @dataclass(frozen=True)
@@ -118,13 +109,13 @@ def picture(source: Figure | Path, caption: str = "") -> Picture:
     return Picture(_encoded(memory.getvalue(), "image/png"), caption)
 
 
-def video(path: Path, caption: str = "") -> Video:
+def video(path: Path, caption: str = "") -> Picture:
     """Returns an mp4 file ready to be put into a page.
 
     Raises:
         InputError: the file is missing or of another kind.
     """
-    return Video(_data_uri(path, "video/"), caption)
+    return Picture(_data_uri(path, "video/"), caption, "video")
 
 
 def measures_table(document: Mapping, caption: str = "") -> Table:
@@ -177,7 +168,7 @@ def shown(cell: Cell) -> str:
 
 
 def is_number(cell: Cell) -> bool:
-    """Tells whether a cell is set to the right."""
+    """Whether a cell is set to the right."""
     return cell is None or isinstance(cell, int | float)
 
 

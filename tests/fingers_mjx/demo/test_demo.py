@@ -11,7 +11,6 @@ import pytest
 from support.cli_setup import TRAIN, make_bundle, make_setup
 
 from fingers_mjx.cli.main import main
-from fingers_mjx.cli.output import counting
 from fingers_mjx.demo.demo import DemoSize
 from fingers_mjx.demo.explore import Exploring
 from fingers_mjx.demo.learn import LearnSize
@@ -69,41 +68,6 @@ def test_without_a_policy_nothing_is_begun(tmp_path, capsys):
     assert main(argv) == 2
     assert "none" in capsys.readouterr().err
     assert not out.exists()
-
-
-class Terminal:
-    """A stream that says that it is one."""
-
-    def __init__(self, live):
-        self.live, self.text = live, ""
-
-    def isatty(self):
-        return self.live
-
-    def write(self, text):
-        self.text += text
-
-    def flush(self):
-        pass
-
-
-def test_counting_is_one_live_line_on_a_terminal():
-    stream = Terminal(live=True)
-    with counting(stream, "drawing", "frames") as count:
-        count(1, 2)
-        count(2, 2)
-    assert stream.text.count("\n") == 1
-    assert stream.text.rstrip().endswith("drawing: 2 of 2 frames")
-
-
-def test_counting_keeps_few_lines_where_they_are_kept():
-    stream = Terminal(live=False)
-    with counting(stream, "drawing", "frames") as count:
-        for index in range(100):
-            count(index + 1, 100)
-    lines = stream.text.splitlines()
-    assert len(lines) <= 3
-    assert '"done": 100' in lines[-1]
 
 
 class Still:
