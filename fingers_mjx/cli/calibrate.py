@@ -6,13 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fingers_mjx.cli.options import add_command, add_path
-from fingers_mjx.cli.records import (
-    add_mechanism,
-    add_records,
-    mechanism_of,
-    records_of,
-)
+from fingers_mjx.cli import options, records
 
 if TYPE_CHECKING:
     from sysid.calibration.calibrate import Calibration
@@ -20,7 +14,7 @@ if TYPE_CHECKING:
 
 def add(actions) -> None:
     """Adds the action and its arguments."""
-    parser = add_command(
+    parser = options.command(
         actions,
         "calibrate",
         run,
@@ -30,9 +24,9 @@ def add(actions) -> None:
         "pulls (logs with a setting normal_n and a column force.<finger>). Writes "
         "hand.yaml, calibration.json and pictures.",
     )
-    add_records(parser, "logs", nargs="+")
-    add_mechanism(parser)
-    add_path(parser, "-o", "--out", metavar="DIR", default=Path("calibration"))
+    records.logs(parser, "logs", nargs="+")
+    records.mechanism(parser)
+    options.path(parser, "-o", "--out", metavar="DIR", default=Path("calibration"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -41,8 +35,8 @@ def run(args: argparse.Namespace) -> int:
     from sysid.calibration.calibrate import calibrate, calibrated_hand
     from sysid.calibration.figures import write_figures
 
-    mechanism = mechanism_of(args)
-    found = calibrate(records_of(args.logs, args.map), mechanism, tell=print)
+    mechanism = records.mechanism_of(args)
+    found = calibrate(records.read(args.logs, args.map), mechanism, tell=print)
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "calibration.json").write_text(found.to_json(), encoding="utf-8")
     write_figures(found, args.out)

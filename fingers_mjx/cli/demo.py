@@ -3,12 +3,12 @@
 import argparse
 from pathlib import Path
 
-from fingers_mjx.cli.options import add_command, add_path, check_directory
+from fingers_mjx.cli import options
 
 
 def add(commands) -> None:
     """Adds the command and its arguments."""
-    parser = add_command(
+    parser = options.command(
         commands,
         "demo",
         run,
@@ -17,8 +17,8 @@ def add(commands) -> None:
         "committed policy, trains a small one, exports it, and writes one "
         "report.html.",
     )
-    add_path(parser, "--out", metavar="DIR", default=Path("demo"))
-    add_path(
+    options.path(parser, "--out", metavar="DIR", default=Path("demo"))
+    options.path(
         parser,
         "--policy",
         metavar="BUNDLE",
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
     """Runs the demonstration; progress and the place of the report go to stdout."""
     from fingers_mjx.demo.demo import POLICY_DIR, demo
 
-    check_directory("--out", args.out)
+    options.check_directory("--out", args.out)
     command = f"fingers demo --out {args.out}"
     command += f" --policy {args.policy}" if args.policy else ""
     print(f"report: {demo(args.out, args.policy or POLICY_DIR, [command])}")

@@ -11,13 +11,7 @@ from typing import TYPE_CHECKING
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli.options import add_command, add_path, add_seed
-from fingers_mjx.cli.records import (
-    add_mechanism,
-    add_records,
-    mechanism_of,
-    records_of,
-)
+from fingers_mjx.cli import options, records
 
 if TYPE_CHECKING:
     from envs.hand.hand_file import HandFile
@@ -28,7 +22,7 @@ if TYPE_CHECKING:
 
 def add(actions) -> None:
     """Adds the action and its arguments."""
-    parser = add_command(
+    parser = options.command(
         actions,
         "diagnose",
         run,
@@ -37,13 +31,13 @@ def add(actions) -> None:
         "OUT/diagnosis.json, OUT/report.html and, for the hand, OUT/hand.yaml with "
         "the effects in it.",
     )
-    add_records(parser, "logs", nargs="+")
-    add_mechanism(parser)
-    add_seed(parser)
+    records.logs(parser, "logs", nargs="+")
+    records.mechanism(parser)
+    options.seed(parser)
     parser.add_argument(
         "--no-report", action="store_true", help="without OUT/report.html"
     )
-    add_path(parser, "-o", "--out", metavar="OUT", default=Path("diagnosis"))
+    options.path(parser, "-o", "--out", metavar="OUT", default=Path("diagnosis"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -52,8 +46,8 @@ def run(args: argparse.Namespace) -> int:
 
     if args.out.exists() and not args.out.is_dir():
         raise InputError(args.out, "", "a file", "a directory for the results")
-    mechanism = mechanism_of(args)
-    logs = records_of(args.logs, args.map)
+    mechanism = records.mechanism_of(args)
+    logs = records.read(args.logs, args.map)
     if _walks(logs):
         hand = _without_effects(mechanism.hand, args, logs)
         return _write(args.out, _diagnosed_walk(logs[0], hand), hand)

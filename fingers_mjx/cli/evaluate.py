@@ -8,20 +8,7 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError
-from fingers_mjx.cli.options import (
-    POLICY_HELP,
-    add_backend,
-    add_command,
-    add_episodes,
-    add_fixed_command,
-    add_path,
-    add_seed,
-    add_settings,
-    backend_of,
-    check_directory,
-    check_file,
-    whole,
-)
+from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from fingers_mjx.runs.setup import Setup
@@ -29,7 +16,7 @@ if TYPE_CHECKING:
 
 def add(commands) -> None:
     """Adds the command and its arguments."""
-    parser = add_command(
+    parser = options.command(
         commands,
         "eval",
         run,
@@ -38,24 +25,24 @@ def add(commands) -> None:
         "for a run directory, writes summary, table of episodes and figures to "
         "RUN/eval unless --out says otherwise.",
     )
-    add_path(parser, "policy", metavar="POLICY", help=POLICY_HELP)
-    add_episodes(parser, 256)
-    add_seed(parser)
+    options.path(parser, "policy", metavar="POLICY", help=options.POLICY_HELP)
+    options.episodes(parser, 256)
+    options.seed(parser)
     parser.add_argument(
         "--steps",
-        type=whole(1),
+        type=options.whole(1),
         metavar="N",
         help="control steps of an episode; default: as in training",
     )
-    add_fixed_command(parser, "m/s, m/s, rad/s in V, for all of every episode")
-    add_backend(parser)
+    options.fixed_command(parser, "m/s, m/s, rad/s in V, for all of every episode")
+    options.backend(parser)
     parser.add_argument(
         "--nominal", action="store_true", help="the nominal hand, without noise"
     )
-    add_settings(parser, "a setting of the task such as env.episode_s=10")
-    add_path(parser, "--json", help="summary to write")
+    options.settings(parser, "a setting of the task such as env.episode_s=10")
+    options.path(parser, "--json", help="summary to write")
     what = "summary, table and figures go here"
-    add_path(parser, "--out", metavar="DIR", help=what)
+    options.path(parser, "--out", metavar="DIR", help=what)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -65,12 +52,12 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.policy.source import is_run, load_source
     from fingers_mjx.training.counting import counting
 
-    backend = backend_of(args)
+    backend = options.backend_of(args)
     if len(args.commands or ()) > 1:
         raise InputError("--command", "", f"{len(args.commands)} commands", "one")
     evaluation.check_policy_settings(args.settings)
-    check_file("--json", args.json)
-    check_directory("--out", args.out)
+    options.check_file("--json", args.json)
+    options.check_directory("--out", args.out)
     loaded = load_source(args.policy)
     source = dataclasses.replace(loaded, setup=_setup(args, loaded.setup))
     with counting(sys.stderr, "evaluating", "steps") as progress:

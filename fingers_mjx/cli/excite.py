@@ -3,13 +3,12 @@
 import argparse
 from pathlib import Path
 
-from fingers_mjx.cli.options import add_command, add_path, add_seed, number, whole
-from fingers_mjx.cli.records import add_mechanism, mechanism_of
+from fingers_mjx.cli import options, records
 
 
 def add(actions) -> None:
     """Adds the action and its arguments."""
-    parser = add_command(
+    parser = options.command(
         actions,
         "excite",
         run,
@@ -18,7 +17,7 @@ def add(actions) -> None:
         "with what every part is for, the limits that the model keeps under it, and "
         "which effects it can show and distinguish.",
     )
-    add_mechanism(parser)
+    records.mechanism(parser)
     parser.add_argument(
         "--joints",
         nargs="+",
@@ -42,15 +41,17 @@ def add(actions) -> None:
         ("--torque-share", 0.0, 0.9, "largest share of the torque (or current) limit"),
     ):
         what = f"{what} (default {default:g})"
-        parser.add_argument(name, type=number(low), default=default, help=what)
-    parser.add_argument("--repeats", type=whole(1, 100), default=3, help="default 3")
-    add_seed(parser)
+        parser.add_argument(name, type=options.number(low), default=default, help=what)
+    parser.add_argument(
+        "--repeats", type=options.whole(1, 100), default=3, help="default 3"
+    )
+    options.seed(parser)
     parser.add_argument(
         "--no-effects",
         action="store_true",
         help="leave out which effects it shows, which takes most of the time",
     )
-    add_path(parser, "-o", "--out", metavar="DIR", default=Path("excite"))
+    options.path(parser, "-o", "--out", metavar="DIR", default=Path("excite"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -61,7 +62,7 @@ def run(args: argparse.Namespace) -> int:
     from sysid.excitation.separation import separation
     from sysid.excitation.waves import WAVES
 
-    mechanism = mechanism_of(args)
+    mechanism = records.mechanism_of(args)
     limits = Limits(
         speed_rad_s=args.speed, torque_share=args.torque_share, reach_rad=args.reach
     )

@@ -2,12 +2,12 @@
 
 import argparse
 
-from fingers_mjx.cli.options import add_command, add_path, check_directory
+from fingers_mjx.cli import options
 
 
 def add(commands) -> None:
     """Adds the command and its arguments."""
-    parser = add_command(
+    parser = options.command(
         commands,
         "export",
         run,
@@ -16,9 +16,9 @@ def add(commands) -> None:
         "config.yaml and hand.yaml; fails if ONNX Runtime and JAX differ by more than "
         "1e-5.",
     )
-    add_path(parser, "run_dir", metavar="RUN", help="run directory")
+    options.path(parser, "run_dir", metavar="RUN", help="run directory")
     what = "directory of the bundle; default RUN"
-    add_path(parser, "--out", metavar="DIR", help=what)
+    options.path(parser, "--out", metavar="DIR", help=what)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -28,7 +28,7 @@ def run(args: argparse.Namespace) -> int:
 
     check_run(args.run_dir)
     out = args.out or args.run_dir
-    check_directory("--out", out)
+    options.check_directory("--out", out)
     report = export_run(args.run_dir, out)
     print(
         f"wrote {out}: policy.onnx, manifest.json, config.yaml, hand.yaml\n"

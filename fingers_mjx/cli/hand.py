@@ -9,14 +9,7 @@ from typing import TYPE_CHECKING
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli.options import (
-    add_command,
-    add_path,
-    add_seed,
-    check_directory,
-    check_file,
-    whole,
-)
+from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from envs.hand.hand_file import HandFile
@@ -60,7 +53,7 @@ def add(commands) -> None:
 
 
 def _add_show(actions) -> None:
-    parser = add_command(
+    parser = options.command(
         actions,
         "show",
         show,
@@ -68,31 +61,31 @@ def _add_show(actions) -> None:
         "Draws the stance from four sides, with the control frame V, fingertips, pad "
         "normals and support polygon.",
     )
-    add_path(parser, "--out", metavar="DIR", default=Path("hand"))
-    add_path(parser, "--hand", help="default: the paper's hand")
+    options.path(parser, "--out", metavar="DIR", default=Path("hand"))
+    options.path(parser, "--hand", help="default: the paper's hand")
 
 
 def _add_stance(actions) -> None:
-    parser = add_command(
+    parser = options.command(
         actions,
         "stance",
         stance,
         "search the stance again",
         "Searches the stance, settles it for 4 s and prints it as JSON.",
     )
-    add_seed(parser)
+    options.seed(parser)
     parser.add_argument(
         "--starts",
-        type=whole(1),
+        type=options.whole(1),
         default=STANCE_STARTS,
         help=f"random starts of the search (default {STANCE_STARTS})",
     )
-    add_path(parser, "--out", help="instead of stdout")
-    add_path(parser, "--hand", help="default: the paper's hand")
+    options.path(parser, "--out", help="instead of stdout")
+    options.path(parser, "--hand", help="default: the paper's hand")
 
 
 def _add_mjcf(actions) -> None:
-    parser = add_command(
+    parser = options.command(
         actions,
         "mjcf",
         mjcf,
@@ -100,12 +93,12 @@ def _add_mjcf(actions) -> None:
         "Writes the hand, standing, as one MJCF file: the model for fingers-deploy run "
         "--driver sim, or to look at in any MuJoCo viewer.",
     )
-    add_path(parser, "-o", "--out", help="instead of stdout")
-    add_path(parser, "--hand", help="default: the paper's hand")
+    options.path(parser, "-o", "--out", help="instead of stdout")
+    options.path(parser, "--hand", help="default: the paper's hand")
 
 
 def _add_import(actions) -> None:
-    parser = add_command(
+    parser = options.command(
         actions,
         "import",
         import_mjcf,
@@ -114,15 +107,15 @@ def _add_import(actions) -> None:
         "hand file for --hand: kinematics, inertia, limits and gains are its own, "
         "collision shapes are fitted to it. Lists what it lacks.",
     )
-    add_path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
+    options.path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
     what = "YAML: joints, our names to the model's; palm_quat, where asked for"
-    add_path(parser, "--joint-map", help=what)
-    add_path(parser, "-o", "--out", required=True, help="hand file")
+    options.path(parser, "--joint-map", help=what)
+    options.path(parser, "-o", "--out", required=True, help="hand file")
 
 
 def show(args: argparse.Namespace) -> int:
     """Draws the stance and prints it in numbers."""
-    check_directory("--out", args.out)
+    options.check_directory("--out", args.out)
     hand = _hand(args)  # a file that is no hand is refused before Pillow is asked for
     from PIL import Image
 
@@ -144,7 +137,7 @@ def stance(args: argparse.Namespace) -> int:
     from envs.hand.stance import settle, stance_json
     from envs.hand.stance_search import search_stance
 
-    check_file("--out", args.out)
+    options.check_file("--out", args.out)
     hand = _hand(args)
     qpos, target = search_stance(hand, args.seed, args.starts)
     return _write(stance_json(settle(hand, qpos, target)), args.out)
@@ -154,7 +147,7 @@ def mjcf(args: argparse.Namespace) -> int:
     """Writes the model of the hand."""
     from envs.hand.standing_mjcf import standing_mjcf
 
-    check_file("--out", args.out)
+    options.check_file("--out", args.out)
     return _write(standing_mjcf(_hand(args)), args.out)
 
 
@@ -164,7 +157,7 @@ def import_mjcf(args: argparse.Namespace) -> int:
     from envs.hand.hand_file import hand_yaml
     from envs.hand.importing.figures import import_hand
 
-    check_file("--out", args.out)
+    options.check_file("--out", args.out)
     given = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
     found = import_hand(args.mjcf, given.joints, given.palm_quat)
     for sentence in found.told:

@@ -19,7 +19,7 @@ MAX_SEED = 2**32 - 1
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 
 
-def add_command(
+def command(
     commands, name: str, run: Callable, summary: str, details: str
 ) -> argparse.ArgumentParser:
     """Adds a command and returns its parser; `run` is called with its arguments."""
@@ -66,12 +66,12 @@ def number(low: float = -math.inf) -> Callable[[str], float]:
     return convert
 
 
-def add_path(parser, *names: str, metavar: str = "FILE", **how) -> None:
+def path(parser, *names: str, metavar: str = "FILE", **how) -> None:
     """Adds an option or an argument whose values are paths."""
     parser.add_argument(*names, type=Path, metavar=metavar, **how)
 
 
-def add_settings(parser, what: str) -> None:
+def settings(parser, what: str) -> None:
     """Adds `--set`."""
     parser.add_argument(
         "--set",
@@ -84,7 +84,7 @@ def add_settings(parser, what: str) -> None:
     )
 
 
-def add_backend(parser) -> None:
+def backend(parser) -> None:
     """Adds `--backend`."""
     parser.add_argument(
         "--backend",
@@ -93,21 +93,21 @@ def add_backend(parser) -> None:
     )
 
 
-def add_seed(parser, default: int | None = 0) -> None:
+def seed(parser, default: int | None = 0) -> None:
     """Adds `--seed`."""
     parser.add_argument(
         "--seed", type=whole(0, MAX_SEED), default=default, help="default 0"
     )
 
 
-def add_episodes(parser, default: int) -> None:
+def episodes(parser, default: int) -> None:
     """Adds `--episodes`."""
     parser.add_argument(
         "--episodes", type=whole(1), default=default, help=f"default {default}"
     )
 
 
-def add_fixed_command(parser, what: str) -> None:
+def fixed_command(parser, what: str) -> None:
     """Adds `--command`."""
     parser.add_argument(
         "--command",

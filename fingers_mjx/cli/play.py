@@ -8,30 +8,21 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from fingers_mjx.cli.options import (
-    add_command,
-    add_episodes,
-    add_fixed_command,
-    add_path,
-    add_seed,
-    check_file,
-    number,
-    whole,
-)
+from fingers_mjx.cli import options
 from fingers_mjx.play.sokoban import LEVELS, SOLUTIONS, Board, read_level
 
 if TYPE_CHECKING:
     from envs.tasks.keyboard.settings import KeyboardConfig
     from fingers_deploy import Bundle
     from fingers_mjx.play.episodes import Session
-    from fingers_mjx.play.player import Player, Schedule
+    from fingers_mjx.play.player import Player
     from fingers_mjx.runs.setup import Setup
     from fingers_robot.behaviour.keys import KeyTimes
 
 
 def add(commands) -> None:
     """Adds the command and its arguments."""
-    parser = add_command(
+    parser = options.command(
         commands,
         "play",
         run,
@@ -41,8 +32,8 @@ def add(commands) -> None:
         "environment takes no part.",
     )
     what = "bundle directory or policy.onnx"
-    add_path(parser, "bundle", metavar="BUNDLE", help=what)
-    add_path(
+    options.path(parser, "bundle", metavar="BUNDLE", help=what)
+    options.path(
         parser,
         "--then",
         metavar="BUNDLE",
@@ -50,14 +41,14 @@ def add(commands) -> None:
         "--command (default: its fastest forward)",
     )
     _add_keys(parser)
-    add_path(parser, "--video", help=".mp4, .webp or .gif to write")
+    options.path(parser, "--video", help=".mp4, .webp or .gif to write")
     parser.add_argument(
-        "--seconds", type=number(0.1), default=20.0, help="length (default 20)"
+        "--seconds", type=options.number(0.1), default=20.0, help="length (default 20)"
     )
-    add_episodes(parser, 1)
-    add_seed(parser)
+    options.episodes(parser, 1)
+    options.seed(parser)
     what = "m/s, m/s, rad/s in V; given several times, they share the time equally"
-    add_fixed_command(parser, what)
+    options.fixed_command(parser, what)
     parser.add_argument(
         "--randomize",
         action="store_true",
@@ -65,7 +56,10 @@ def add(commands) -> None:
         "hand",
     )
     parser.add_argument(
-        "--friction", type=number(0.0), metavar="MU", help="friction of the fingertips"
+        "--friction",
+        type=options.number(0.0),
+        metavar="MU",
+        help="friction of the fingertips",
     )
     parser.add_argument(
         "--runtime",
@@ -74,12 +68,18 @@ def add(commands) -> None:
         help="what runs the policy",
     )
     parser.add_argument(
-        "--fps", type=number(1.0), default=25.0, help="frames per second (default 25)"
+        "--fps",
+        type=options.number(1.0),
+        default=25.0,
+        help="frames per second (default 25)",
     )
     parser.add_argument(
-        "--width", type=whole(64, 4096), default=640, help="of the video (default 640)"
+        "--width",
+        type=options.whole(64, 4096),
+        default=640,
+        help="of the video (default 640)",
     )
-    add_path(parser, "--json", help="summary to write")
+    options.path(parser, "--json", help="summary to write")
 
 
 def _add_keys(parser) -> None:
@@ -95,7 +95,7 @@ def _add_keys(parser) -> None:
     )
     parser.add_argument(
         "--retries",
-        type=whole(0, 10),
+        type=options.whole(0, 10),
         default=0,
         help="keyboard: ask again after a time-out (default 0)",
     )
@@ -105,9 +105,9 @@ def run(args: argparse.Namespace) -> int:
     """Plays; the table goes to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary, print_measures
     from fingers_mjx.evaluation.source import document
-    from fingers_mjx.play.episodes import play_episodes
+    from fingers_mjx.play.episodes import play_episodes, schedule_of
     from fingers_mjx.play.keyboard import KeyPlayer, keys_story
-    from fingers_mjx.play.recovery import RecoveryPlayer, story
+    from fingers_mjx.play.recovery import RecoveryPlayer, is_recovery, story
     from fingers_mjx.play.video import VIDEO_SUFFIXES
     from fingers_mjx.policy.source import PolicySource, load_bundle_setup
     from fingers_mjx.training.counting import counting
@@ -115,13 +115,14 @@ def run(args: argparse.Namespace) -> int:
     if args.video and args.video.suffix not in VIDEO_SUFFIXES:
         valid = one_of(VIDEO_SUFFIXES)
         raise InputError("--video", "suffix", args.video.suffix, valid)
-    check_file("--json", args.json)
-    check_file("--video", args.video)
+    options.check_file("--json", args.json)
+    options.check_file("--video", args.video)
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
     player = _player(args, setup, bundle)
     steps = max(1, round(args.seconds / player.env.dt))
-    schedule = _schedule(args, bundle, steps)
+    scheduled = args.commands and not is_recovery(bundle)
+    schedule = schedule_of(args.commands, steps) if scheduled else None
     with counting(sys.stderr, "playing", "episodes") as progress:
         played = play_episodes(
             player, args.episodes, steps, args.seed, schedule, progress
@@ -201,16 +202,6 @@ def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
         check_chain(bundle, then)
     command = tuple(commands[0]) if commands else None
     return RecoveryPlayer(env, bundle, then, command, args.runtime)
-
-
-def _schedule(args: argparse.Namespace, bundle: Bundle, steps: int) -> Schedule | None:
-    """Returns the command of each step; a recovery has none."""
-    from fingers_mjx.play.episodes import schedule_of
-    from fingers_mjx.play.recovery import is_recovery
-
-    if not args.commands or is_recovery(bundle):
-        return None
-    return schedule_of(args.commands, steps)
 
 
 def _then_name(args: argparse.Namespace) -> str | None:

@@ -7,27 +7,27 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from envs.errors import InputError
-from fingers_mjx.cli.options import add_path
+from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from sysid.logs.log import MeasuredLog
     from sysid.mechanism import Mechanism
 
 
-def add_records(parser, *names: str, **how) -> None:
+def logs(parser, *names: str, **how) -> None:
     """Adds the logs, and `--map` for those that are bags."""
-    add_path(parser, *names, metavar="LOG", help="CSV, Parquet, MCAP, bag", **how)
-    add_path(parser, "--map", help="topics and names of a bag, as YAML")
+    options.path(parser, *names, metavar="LOG", help="CSV, Parquet, MCAP, bag", **how)
+    options.path(parser, "--map", help="topics and names of a bag, as YAML")
 
 
-def add_mechanism(parser) -> None:
+def mechanism(parser) -> None:
     """Adds the options that name the mechanism."""
-    add_path(parser, "--hand", help="hand.yaml; default: the paper's hand")
-    add_path(parser, "--mjcf", help="another mechanism, with --drive")
-    add_path(parser, "--drive", help="drive.yaml")
+    options.path(parser, "--hand", help="hand.yaml; default: the paper's hand")
+    options.path(parser, "--mjcf", help="another mechanism, with --drive")
+    options.path(parser, "--drive", help="drive.yaml")
 
 
-def records_of(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
+def read(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
     """Reads logs; a map belongs to the bags among them.
 
     Raises:

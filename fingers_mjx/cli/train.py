@@ -9,15 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from fingers_mjx.cli.options import (
-    add_backend,
-    add_command,
-    add_path,
-    add_seed,
-    add_settings,
-    check_directory,
-    train_config,
-)
+from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from fingers_mjx.ppo.config import TrainConfig
@@ -28,7 +20,7 @@ _FOR_NEW_RUNS = ("hand", "out", "warm_start")
 
 def add(commands) -> None:
     """Adds the command and its arguments."""
-    parser = add_command(
+    parser = options.command(
         commands,
         "train",
         run,
@@ -43,13 +35,15 @@ def add(commands) -> None:
         help="paper (its settings), fast (one GPU) or cpu (small); default: by machine",
     )
     what = "a setting such as ppo.entropy_cost=0.001 or env.action_clip=0.8"
-    add_settings(parser, what)
-    add_backend(parser)
-    add_seed(parser, None)
-    add_path(parser, "--hand", help="hand.yaml; default: the paper's hand")
-    add_path(parser, "--out", metavar="RUN", help="new directory; default: under runs/")
-    add_path(parser, "--resume", metavar="RUN", help="go on with this run")
-    add_path(
+    options.settings(parser, what)
+    options.backend(parser)
+    options.seed(parser, None)
+    options.path(parser, "--hand", help="hand.yaml; default: the paper's hand")
+    options.path(
+        parser, "--out", metavar="RUN", help="new directory; default: under runs/"
+    )
+    options.path(parser, "--resume", metavar="RUN", help="go on with this run")
+    options.path(
         parser,
         "--warm-start",
         metavar="RUN|BUNDLE",
@@ -66,7 +60,7 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.training.train import Start, train
 
     _check_words(args.settings)
-    check_directory("--out", args.out)
+    options.check_directory("--out", args.out)
     resume = args.resume is not None
     setup = _resumed(args) if resume else _new(args)
     path = args.resume or args.out or _default_dir(setup.train)
@@ -94,7 +88,7 @@ def _new(args: argparse.Namespace) -> Setup:
     if args.task is None:
         raise InputError("TASK", "", "", one_of(task_names()))
     get_task(args.task)
-    setup = new_setup(train_config(args, args.seed), args.hand)
+    setup = new_setup(options.train_config(args, args.seed), args.hand)
     return overridden(setup, args.settings)
 
 

@@ -10,17 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli.options import (
-    add_backend,
-    add_command,
-    add_path,
-    add_seed,
-    add_settings,
-    backend_of,
-    check_directory,
-    train_config,
-    whole,
-)
+from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from fingers_mjx.policy.source import PolicySource
@@ -36,7 +26,7 @@ _NOTE = (
 
 def add(actions) -> None:
     """Adds the action and its arguments."""
-    parser = add_command(
+    parser = options.command(
         actions,
         "transfer",
         run,
@@ -46,10 +36,10 @@ def add(actions) -> None:
         "drift, survival. Writes OUT/transfer.json beside both runs.",
     )
     what = "hand.yaml of the simulator that stands for the real hand"
-    add_path(parser, "--real", required=True, help=what)
-    add_path(parser, "--extended", help="hand.yaml of a diagnosis")
-    add_path(parser, "--default", help="default: the paper's hand")
-    add_path(
+    options.path(parser, "--real", required=True, help=what)
+    options.path(parser, "--extended", help="hand.yaml of a diagnosis")
+    options.path(parser, "--default", help="default: the paper's hand")
+    options.path(
         parser,
         "--policies",
         nargs=2,
@@ -59,15 +49,20 @@ def add(actions) -> None:
     parser.add_argument("--task", metavar="TASK", default="crawl", help="default crawl")
     parser.add_argument("--preset", metavar="NAME", help="as in fingers train")
     what = "fine-tune this policy on both hands"
-    add_path(parser, "--warm-start", metavar="RUN|BUNDLE", help=what)
-    add_settings(parser, "a setting of both trainings, as in fingers train")
-    add_backend(parser)
+    options.path(parser, "--warm-start", metavar="RUN|BUNDLE", help=what)
+    options.settings(parser, "a setting of both trainings, as in fingers train")
+    options.backend(parser)
     parser.add_argument(
-        "--episodes", type=whole(1), default=64, help="of each kind (default 64)"
+        "--episodes",
+        type=options.whole(1),
+        default=64,
+        help="of each kind (default 64)",
     )
-    parser.add_argument("--steps", type=whole(1), help="control steps of an episode")
-    add_seed(parser)
-    add_path(parser, "-o", "--out", metavar="OUT", default=Path("transfer"))
+    parser.add_argument(
+        "--steps", type=options.whole(1), help="control steps of an episode"
+    )
+    options.seed(parser)
+    options.path(parser, "-o", "--out", metavar="OUT", default=Path("transfer"))
 
 
 def run(args: argparse.Namespace) -> int:
@@ -76,8 +71,8 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.policy.source import load_source
     from fingers_mjx.transfer import compared, in_real_hand
 
-    backend = backend_of(args)
-    check_directory("--out", args.out)
+    backend = options.backend_of(args)
+    options.check_directory("--out", args.out)
     if (args.policies is None) == (args.extended is None):
         found = "both" if args.policies else "neither"
         valid = "hands to train on (--extended) or trained policies (--policies)"
@@ -113,7 +108,7 @@ def _trained(args: argparse.Namespace) -> list[Path]:
     from fingers_mjx.training.progress import reporter
     from fingers_mjx.transfer import train_on
 
-    config = train_config(args, args.seed)
+    config = options.train_config(args, args.seed)
     setup = overridden(new_setup(config, args.default), args.settings)
     hands = {"default": setup.hand, "extended": load_hand_file(args.extended)}
     if hands["default"].sha256 == hands["extended"].sha256:

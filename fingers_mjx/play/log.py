@@ -13,6 +13,7 @@ from jaxtyping import Array, Float
 
 from envs.hand.figures import figures
 from envs.physics import PhysicsState
+from fingers_deploy.rotations import multiply
 from fingers_mjx.play.player import Played, Player, Schedule
 from sysid.logs.log import MeasuredLog, make_log
 
@@ -94,15 +95,9 @@ def _log(rows, dt: float, rng: np.random.Generator, noise: WalkNoise) -> Measure
         [np.ones((len(rows), 1)), rng.normal(0.0, noise.pose_rad / 2, (len(rows), 3))],
         axis=1,
     )
-    turned = _product(base[:, 3:], turn / np.linalg.norm(turn, axis=1, keepdims=True))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    turned = multiply(base[:, 3:].T, turn.T).T
     columns |= {f"base.{a}": place[:, i] for i, a in enumerate(_AXES)}
     columns |= {f"base.q{a}": turned[:, i] for i, a in enumerate("wxyz")}
     t_s = np.arange(len(rows)) * dt
     return make_log(names, t_s, columns, mounting="free")
-
-
-def _product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Quaternion product, row by row."""
-    w, u, x, v = a[:, :1], a[:, 1:], b[:, :1], b[:, 1:]
-    scalar = w * x - np.sum(u * v, 1, keepdims=True)
-    return np.concatenate([scalar, w * v + x * u + np.cross(u, v)], 1)

@@ -12,7 +12,6 @@ from envs.errors import InputError
 from envs.tasks.recovery.falls import Falls
 from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.rotations import gravity
-from fingers_mjx.cli import play as cli_play
 from fingers_mjx.cli.main import main
 from fingers_mjx.evaluation.source import as_deployed, nominal
 from fingers_mjx.play.behaviours import Behaviours, orientation_of, sticks_for
@@ -174,8 +173,9 @@ def test_play_and_evaluation_start_from_falls_alone(recovery, setup, monkeypatch
 
     env = dataclasses.replace(setup.env, practice_fraction=1.0)
     trained = dataclasses.replace(setup, env=env)
-    monkeypatch.setattr(cli_play, "make_env", refuse)
-    monkeypatch.setattr(cli_play, "load_bundle_setup", lambda _: (recovery, trained))
+    loaded = "fingers_mjx.policy.source.load_bundle_setup"
+    monkeypatch.setattr("fingers_mjx.runs.setup.make_env", refuse)
+    monkeypatch.setattr(loaded, lambda _: (recovery, trained))
     assert main(["play", str(recovery.source), "--randomize"]) == 2
     assert made[0].practice_fraction == 0.0
     assert as_deployed(trained).env.settle
