@@ -35,18 +35,18 @@ class PlayInputs:
             target_w = np.append(np.asarray(memory.task.target_w), HALF_M)
             self._tracker = ObjectTracker(target_w, self._env.stance.q_off)
 
-    def read(self, memory: Memory, seen: Sample) -> Float[np.ndarray, " inputs"]:
+    def read(self, memory: Memory, sensed: Sample) -> Float[np.ndarray, " inputs"]:
         """Returns the inputs of a control step, term after term.
 
         Args:
             memory: before the step.
-            seen: what the sensors measure.
+            sensed: what the sensors measure.
         """
         if self._tracker is None:
             terms = self._env.input_terms
-            return np.concatenate([np.asarray(seen.inputs[t.name]) for t in terms])
+            return np.concatenate([np.asarray(sensed.inputs[t.name]) for t in terms])
         self._tracker.update(_frame(memory.task))
-        return self._tracker.inputs(np.asarray(seen.gravity))
+        return self._tracker.inputs(np.asarray(sensed.gravity))
 
 
 def _frame(task: PushMemory) -> Frame:

@@ -50,13 +50,13 @@ class WalkRecorder(Player):
 
     def _target(self, memory: Any, state: PhysicsState) -> Float[np.ndarray, "20"]:
         target = super()._target(memory, state)
-        seen: Any = jax.device_get(self._read(memory, state))
+        sensed: Any = jax.device_get(self._read(memory, state))
         reference = np.asarray(self.env.stance.joint_pos_rad)
         row = {
             "cmd": np.array(target, float),
-            "pos": seen.joint_pos + reference,
-            "gravity": seen.gravity,
-            "gyro": seen.angvel,
+            "pos": sensed.joint_pos + reference,
+            "gravity": sensed.gravity,
+            "gyro": sensed.angvel,
             "base": np.asarray(state.qpos[:7], float),
             "tau": self.rows[-1]["after"] if self.rows else np.full(20, np.nan),
         }

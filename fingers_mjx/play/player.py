@@ -109,21 +109,21 @@ class Player:
 
     def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
         """Returns what the shim makes of what the sensors measure."""
-        seen = self._read(memory, state)
+        sensed = self._read(memory, state)
         reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
-        joint_pos = np.asarray(seen.joint_pos) + reference
+        joint_pos = np.asarray(sensed.joint_pos) + reference
         return self.controller.step(
             joint_pos,
-            np.asarray(seen.gravity),
-            np.asarray(seen.angvel),
-            self._task_inputs(memory, seen, joint_pos),
+            np.asarray(sensed.gravity),
+            np.asarray(sensed.angvel),
+            self._task_inputs(memory, sensed, joint_pos),
         )
 
     def _task_inputs(
-        self, memory: Memory, seen: Sample, joint_pos: Float[np.ndarray, "20"]
+        self, memory: Memory, sensed: Sample, joint_pos: Float[np.ndarray, "20"]
     ) -> Float[np.ndarray, " inputs"]:
         del joint_pos
-        return self._inputs.read(memory, seen)
+        return self._inputs.read(memory, sensed)
 
     def _reading(self, memory: Memory, state: PhysicsState) -> Sample:
         return self.env.sample(state, vars(memory))
