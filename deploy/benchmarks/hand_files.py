@@ -2,11 +2,8 @@
 
 A trained policy is better; this one needs no training: a clipped linear oscillator over
 its own previous actions, which lifts the fingers in turn.
-
-    python deploy/benchmarks/hand_files.py --model hand.xml --bundle march
 """
 
-import argparse
 from pathlib import Path
 
 import numpy as np
@@ -27,7 +24,7 @@ from fingers_deploy.manifest import (
     Provenance,
     Term,
 )
-from fingers_mjx.export.bundle import encode_bundle, write_bundle
+from fingers_mjx.export.bundle import encode_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.interface import interface_of
 
@@ -85,39 +82,25 @@ def marching_bundle(task: str = "crawl") -> Bundle:
         weight[newest_action + joint, joint] = 2 * growth * np.cos(omega)
         weight[newest_action - 20 + joint, joint] = -(growth**2)
         bias[joint] = 0.05 * sign
-    zero, one = np.zeros(392, np.float32), np.ones(392, np.float32)
-    layers = ((weight.astype(np.float32), bias.astype(np.float32)),)
-    weights = PolicyWeights(layers, zero, one, CLIP)
-    obs = np.random.default_rng(0).normal(0, 0.3, (8, 392)).astype(np.float32)
-    action = np.clip(obs @ layers[0][0] + layers[0][1], -CLIP, CLIP)
-    provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
-    return encode_bundle(weights, task, hand_interface(), provenance, (obs, action))
+    return _bundle(task, hand_interface(), weight, bias)
 
 
 def standing_bundle(task: str) -> Bundle:
     """A policy that stands in the stance of a task: its actions are all zero."""
     interface = interface_of(make_batch(task, 1))
     size = sum(term.size * term.history for term in interface.observation.terms)
+    return _bundle(task, interface, np.zeros((size, 20)), np.zeros(20))
+
+
+def _bundle(
+    task: str, interface: Interface, weight: np.ndarray, bias: np.ndarray
+) -> Bundle:
+    """A bundle of one linear layer."""
+    size, clip = len(weight), interface.action.clip
     zero, one = np.zeros(size, np.float32), np.ones(size, np.float32)
-    layers = ((np.zeros((size, 20), np.float32), np.zeros(20, np.float32)),)
-    weights = PolicyWeights(layers, zero, one, interface.action.clip)
+    layer = weight.astype(np.float32), bias.astype(np.float32)
     obs = np.random.default_rng(0).normal(0, 0.3, (8, size)).astype(np.float32)
+    action = np.clip(obs @ layer[0] + layer[1], -clip, clip)
     provenance = Provenance("0" * 64, Normalizer(0, 0), None, {"fingers_deploy": "0"})
-    answers = obs, np.zeros((8, 20), np.float32)
-    return encode_bundle(weights, task, interface, provenance, answers)
-
-
-def main() -> None:
-    """Writes the model, and the policy that marches, to the given paths."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("--model", type=Path, help="MJCF file to write")
-    parser.add_argument("--bundle", type=Path, help="folder of the policy to write")
-    options = parser.parse_args()
-    if options.model:
-        write_model(options.model)
-    if options.bundle:
-        write_bundle(options.bundle, marching_bundle())
-
-
-if __name__ == "__main__":
-    main()
+    weights = PolicyWeights((layer,), zero, one, clip)
+    return encode_bundle(weights, task, interface, provenance, (obs, action))

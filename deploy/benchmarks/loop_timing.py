@@ -37,13 +37,11 @@ def _busy() -> None:
         block[:] = bytes(len(block))
 
 
-def processor_s() -> tuple[float, float]:
-    """Time of all processors so far [s]: busy, and taken away by the host."""
-    user, nice, system, _, _, irq, soft, steal = map(
-        int, Path("/proc/stat").read_text().split()[1:9]
-    )
-    per_s = os.sysconf("SC_CLK_TCK")
-    return (user + nice + system + irq + soft + steal) / per_s, steal / per_s
+def busy_s() -> float:
+    """Busy time of all processors so far [s]."""
+    words = Path("/proc/stat").read_text().split()[1:8]
+    user, nice, system, _, _, irq, soft = map(int, words)
+    return (user + nice + system + irq + soft) / os.sysconf("SC_CLK_TCK")
 
 
 class Memory:
@@ -97,9 +95,9 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
         options = plain_options(bundle, simulator.path, out, realtime=realtime)
         launcher = Launcher(options, lines.append)
         memory = Memory(launcher)
-        begin, before = time.monotonic(), processor_s()
+        begin, before = time.monotonic(), busy_s()
         operate(launcher, seconds, memory.sample)
-        took, after = time.monotonic() - begin, processor_s()
+        took, after = time.monotonic() - begin, busy_s()
         if took < seconds:
             raise SystemExit("\n".join(["the run ended early", *lines[-9:]]))
         files = sorted(Path(out).glob("*.mcap"))
@@ -110,8 +108,7 @@ def measure(bundle: Path, model: Path, seconds: float, realtime: bool) -> dict:
     asked = timing["control_steps"] + timing["skipped"]
     return {
         "minutes": round(took / 60, 1),
-        "busy_cores": round((after[0] - before[0]) / took, 2),
-        "stolen_s": round(after[1] - before[1], 2),
+        "busy_cores": round((after - before) / took, 2),
         "scheduler": status["realtime"],
         "missed_percent": round(100 * missed / asked, 4),
         "missed": missed,

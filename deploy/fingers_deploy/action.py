@@ -26,23 +26,43 @@ class ActionTransform:
         self._clip = np.float32(interface.action.clip)
 
     def clip_action(self, action: ArrayLike) -> Array:
-        """Returns a_t, [20], within ±c; NaN stays NaN."""
+        """Returns a_t = min(max(a, −c), c), within ±c; NaN stays NaN.
+
+        Args:
+            action: policy output [1], [20].
+
+        Source:
+            Ours: the bound of training (`docs/reference/crawl.md`, Action).
+        """
         return np.clip(np.asarray(action, np.float32), -self._clip, self._clip)
 
     def clip_target(self, target_rad: ArrayLike) -> Array:
-        """Returns the target [rad] within the joint limits; NaN stays NaN, [20]."""
+        """Returns min(max(target, low), high), within the limits; NaN stays NaN.
+
+        Args:
+            target_rad: joint targets [rad], [20].
+
+        Source:
+            Ours: the limits of training (`docs/reference/crawl.md`, Action).
+        """
         return np.clip(np.asarray(target_rad, np.float32), self.low, self.high)
 
     def step(self, target_rad: ArrayLike, action: ArrayLike) -> Array:
-        """Returns the next target [rad], [20]: finite and within the joint limits.
+        """Returns clip(target + α·tanh(clip(a, ±c))): finite, within the limits.
 
         Args:
-            target_rad: the target so far, [20].
-            action: policy output, clipped or not, [20].
+            target_rad: the target so far [rad], [20].
+            action: policy output a [1], clipped or not, [20].
+
+        Returns:
+            The next target [rad], [20].
 
         Raises:
             ValueError: another shape, or a NaN or an infinity in an argument; what to
                 do then is for the caller to decide (`PolicyController` holds).
+
+        Source:
+            Ours: the action of training (`docs/reference/crawl.md`, Action).
         """
         target = np.asarray(target_rad, np.float32)
         action = np.asarray(action, np.float32)

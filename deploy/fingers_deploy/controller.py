@@ -44,11 +44,14 @@ class PolicyController:
         """Starts an episode; the next sample fills the whole history.
 
         Args:
-            target_rad: targets to go on from, e.g. the measured pose, [20]; the
-                initial target of the training when left out.
+            target_rad: targets to go on from, e.g. the measured pose [rad], [20]; the
+                initial target of the training when left out. a_{t−1} = 0.
 
         Raises:
             ValueError: targets of another shape or not finite.
+
+        Source:
+            Ours: an episode of training begins so (`docs/reference/crawl.md`).
         """
         initial = self.bundle.manifest.interface.initial_target_rad
         self.action: Array = np.zeros(len(initial), np.float32)
@@ -67,11 +70,14 @@ class PolicyController:
 
         Args:
             history: observation history up to the last control step.
-            action: clipped policy output of that step, [20].
-            target_rad: targets on the wire, [20].
+            action: clipped policy output a_{t−1} = clip(a, ±c) of that step [1], [20].
+            target_rad: targets on the wire [rad], [20].
 
         Raises:
             ValueError: targets of another shape or not finite.
+
+        Source:
+            Ours: what one policy measured, another would have measured as well.
         """
         self.reset(target_rad)
         self._history = history
@@ -86,6 +92,9 @@ class PolicyController:
     ) -> Array:
         """Returns the joint targets [rad] of this control step, [20].
 
+        target ← clip(target + α·tanh(π(o))), with the policy π and the observation o of
+        `ObservationAssembler`.
+
         Args:
             joint_pos: measured joint angles [rad], in the manifest's joint order, [20].
             gravity_b: unit vector of gravity (points down) in the palm frame, [3].
@@ -94,6 +103,9 @@ class PolicyController:
 
         Raises:
             ValueError: an argument of another shape.
+
+        Source:
+            Ours: the control step of training (`docs/reference/crawl.md`).
         """
         sample = self.assembler.sample(
             joint_pos, gravity_b, angvel_b, self.action, command

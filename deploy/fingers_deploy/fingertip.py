@@ -31,11 +31,15 @@ _TIP: Vector = (-0.00105, 0.0002, 0.0215)
 def pressing_fingertip(joint_pos: ArrayLike, v_quat_b: ArrayLike) -> Array:
     """Centre of the pressing fingertip relative to the palm's origin, in V [m], [3].
 
+    p = q_V* (p₁ + R₁(p₂ + R₂(… + R₄ tip))), with R_i the link's pose and joint angle.
     Training uses the same formula (`envs.tasks.keyboard.stance`).
 
     Args:
         joint_pos: measured joint angles [rad], [20].
-        v_quat_b: orientation of V in the palm frame, from the manifest.
+        v_quat_b: orientation of V in the palm frame, w x y z, from the manifest, [4].
+
+    Source:
+        Vendor's description of the WUJI hand, release 2026.04.27.
     """
     angles = np.asarray(joint_pos, np.float64)[FIRST_JOINT : FIRST_JOINT + len(_LINKS)]
     place: Array = np.asarray(_TIP, np.float64)

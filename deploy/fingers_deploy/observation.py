@@ -49,16 +49,21 @@ class ObservationAssembler:
     ) -> Sample:
         """Returns the scaled terms of one control step, in the manifest's order.
 
+        o_i = scale_i · x_i; of the joint angles the reference is subtracted before.
+
         Args:
             joint_pos: measured joint angles [rad], in the manifest's joint order, [20].
             gravity_b: unit vector of gravity (points down) in the palm frame, [3].
             angvel_b: angular velocity of the palm in the palm frame [rad/s], [3].
-            previous_action: clipped policy output of the step before, [20].
+            previous_action: clipped policy output of the step before [1], [20].
             command: all task inputs one after another as the manifest's terms
                 describe them, e.g. v_x, v_y [m/s] and yaw rate [rad/s] in V, [3].
 
         Raises:
             ValueError: an argument of another shape.
+
+        Source:
+            Ours: the observation of training (`docs/reference/crawl.md`).
         """
         values = {
             "joint_pos": np.asarray(joint_pos, np.float32),
@@ -103,5 +108,12 @@ class ObservationAssembler:
         )
 
     def flatten(self, history: History) -> NDArray[np.float32]:
-        """Returns the observation vector [N]."""
+        """Returns the observation vector o = (H₁, H₂, …) [N], scaled, without unit [1].
+
+        Args:
+            history: each term's samples H_i, oldest first, [history, size] each.
+
+        Source:
+            Ours: the order of training (`docs/reference/crawl.md`).
+        """
         return np.concatenate([kept.ravel() for kept in history])

@@ -11,7 +11,16 @@ Vector = Sequence[float] | Array
 
 
 def multiply(a: Vector, b: Vector) -> Array:
-    """Hamilton product a ⊗ b: first the rotation b, then a; [4]."""
+    """Hamilton product c = a ⊗ b: first the rotation b, then a; [4].
+
+    Args:
+        a: quaternion w x y z [1], [4].
+        b: quaternion w x y z [1], [4].
+
+    Source:
+        Solà, *Quaternion kinematics for the error-state Kalman filter*, 2017
+        (Hamilton convention).
+    """
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return np.array(
@@ -25,7 +34,16 @@ def multiply(a: Vector, b: Vector) -> Array:
 
 
 def unrotate(q: Vector, v: Vector) -> Array:
-    """Turns world components of v into those of the frame q: q* ⊗ v ⊗ q; [3]."""
+    """Turns world components of v into those of the frame q, v' = q* ⊗ v ⊗ q; [3].
+
+    Args:
+        q: orientation of the frame, unit quaternion w x y z [1], [4].
+        v: a vector, e.g. in [m] or [m/s], [3].
+
+    Source:
+        Solà, *Quaternion kinematics for the error-state Kalman filter*, 2017
+        (Hamilton convention).
+    """
     w, x, y, z = q
     a, b, c = v
     # t = 2 (−u) × v with u the vector part; v + w t + (−u) × t
@@ -40,13 +58,29 @@ def unrotate(q: Vector, v: Vector) -> Array:
 
 
 def conjugate(q: Vector) -> Array:
-    """The inverse rotation of a unit quaternion, [4]."""
+    """The inverse rotation of a unit quaternion, q* = (w, −x, −y, −z); [4].
+
+    Args:
+        q: unit quaternion w x y z [1], [4].
+
+    Source:
+        Solà, *Quaternion kinematics for the error-state Kalman filter*, 2017
+        (Hamilton convention).
+    """
     w, x, y, z = q
     return np.array((w, -x, -y, -z))
 
 
 def gravity(quat_w: Vector) -> Array:
-    """Unit vector of gravity (points down) in a frame of this orientation, [3]."""
+    """Unit vector of gravity in a frame of this orientation, q* ⊗ (0, 0, −1) ⊗ q; [3].
+
+    Args:
+        quat_w: orientation in a level world frame, unit quaternion w x y z [1], [4].
+
+    Source:
+        Solà, *Quaternion kinematics for the error-state Kalman filter*, 2017
+        (Hamilton convention).
+    """
     w, x, y, z = quat_w
     return np.array(
         (2 * (w * y - x * z), -2 * (w * x + y * z), 2 * (x * x + y * y) - 1.0)

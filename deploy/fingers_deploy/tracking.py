@@ -49,7 +49,14 @@ class ObjectTracker:
         self._slow: Array = np.zeros(3)
 
     def aim(self, target_pos_w: ArrayLike) -> None:
-        """Sets another target [m], [3]."""
+        """Sets another target p* in the world.
+
+        Args:
+            target_pos_w: where the object is to go [m], [3].
+
+        Source:
+            Ours: fixed in the world, as in training (`docs/reference/push.md`).
+        """
         self._target = np.asarray(target_pos_w, np.float64)
 
     def update(self, frame: Frame) -> None:
@@ -66,13 +73,19 @@ class ObjectTracker:
             self._frame, self._slow = frame, self._slow + share * (pos - self._slow)
 
     def inputs(self, gravity_b: ArrayLike) -> NDArray[np.float32]:
-        """Returns object position, velocity and way to the target in V, [9].
+        """Returns object position [m], velocity [m/s], way to the target [m] in V, [9].
+
+        (p − p_palm, (p − s)/τ, p* − p), with the low-pass s of `update`.
 
         Args:
-            gravity_b: unit vector of gravity in the palm frame, as the IMU measures it.
+            gravity_b: unit vector of gravity in the palm frame as the IMU measures it
+                [1], [3].
 
         Raises:
             ValueError: before the first sample.
+
+        Source:
+            Ours: the inputs of training (`docs/reference/push.md`).
         """
         if self._frame is None:
             raise ValueError("tracker: found no camera sample; valid: one or more")
@@ -90,10 +103,16 @@ class ObjectTracker:
 def to_v(vector_w: Array, heading_rad: float, gravity_v: Array) -> Array:
     """World components of a vector as components in V, [3].
 
+    v = (c·x + s·y) e_ahead + (c·y − s·x) e_left + z·e_up, with cosine and sine of the
+    heading: tilt from the IMU, heading from the camera.
+
     Args:
-        vector_w: the vector, [3].
-        heading_rad: angle about the vertical of V's x axis, seen from above.
-        gravity_v: unit vector of gravity in V, [3].
+        vector_w: the vector (x, y, z), e.g. in [m], [3].
+        heading_rad: angle about the vertical of V's x axis, seen from above [rad].
+        gravity_v: unit vector of gravity in V [1], [3].
+
+    Source:
+        Ours (`docs/reference/push.md`, Camera).
     """
     up = -gravity_v
     ahead = np.array([1.0, 0.0, 0.0]) - up[0] * up

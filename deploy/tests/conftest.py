@@ -17,7 +17,7 @@ from fingers_deploy.manifest import (
 from fingers_mjx.export.bundle import encode_bundle, write_bundle
 from fingers_mjx.export.onnx_graph import PolicyWeights
 
-# The measurements are tested as well: `hand_files`, `fault_lab`, ….
+# The measurements are tested as well: `hand_files`, `faults`, ….
 sys.path.append(str(Path(__file__).parents[1] / "benchmarks"))
 
 SEED = 20260
