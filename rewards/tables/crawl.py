@@ -23,14 +23,20 @@ CURRICULUM_STEPS = 18_000
 _PLANAR_TRACKING = RewardTerm(
     "track_planar_velocity", track_planar_velocity, 1.0, ("vel_v", "command")
 )
-_REGULARIZERS: RewardTable = (
-    RewardTerm("undesired_contact", undesired_contact, -1.0, ("link_contact",)),
-    RewardTerm("vertical_velocity", vertical_velocity, -2.0, ("vel_v",)),
-    RewardTerm("roll_pitch_rate", roll_pitch_rate, -0.05, ("angvel_v",)),
+EFFORT: RewardTable = (
     RewardTerm("action_rate", action_rate, -0.01, ("action", "previous_action")),
     RewardTerm("torque", torque, -2.5e-5, ("torque_nm",)),
     RewardTerm("joint_acceleration", joint_acceleration, -2.5e-7, ("joint_acc",)),
 )
+"""Rows that every task has."""
+
+REGULARIZERS: RewardTable = (
+    RewardTerm("undesired_contact", undesired_contact, -1.0, ("link_contact",)),
+    RewardTerm("vertical_velocity", vertical_velocity, -2.0, ("vel_v",)),
+    RewardTerm("roll_pitch_rate", roll_pitch_rate, -0.05, ("angvel_v",)),
+    *EFFORT,
+)
+"""Rows of every task in which the hand stands."""
 
 
 def _yaw_tracking(weight: float | StepSwitch) -> RewardTerm:
@@ -58,7 +64,7 @@ CRAWL: RewardTable = (
         -0.5,
         ("tip_vel_v", "tip_force_n", "command"),
     ),
-    *_REGULARIZERS,
+    *REGULARIZERS,
 )
 """The paper's crawl reward (paper, table of training settings)."""
 
@@ -67,7 +73,7 @@ STOCK: RewardTable = (
     _yaw_tracking(0.5),
     RewardTerm("feet_air_time", precomputed, 0.5, ("air_time_magnitude",)),
     RewardTerm("flat_orientation", flat_orientation, -5.0, ("gravity_v",)),
-    *_REGULARIZERS,
+    *REGULARIZERS,
 )
 """Isaac Lab's ANYmal-D flat velocity task with its published weights, on the hand.
 

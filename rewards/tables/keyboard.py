@@ -12,8 +12,7 @@ knows where the keys are.
 """
 
 from rewards.compose import RewardTable, RewardTerm, precomputed
-from rewards.contact import foot_slide, undesired_contact
-from rewards.effort import joint_acceleration, torque
+from rewards.contact import foot_slide
 from rewards.keyboard import (
     fingertip_distance,
     keys_touched,
@@ -22,10 +21,9 @@ from rewards.keyboard import (
     support_contact,
     support_drift,
 )
-from rewards.motion import roll_pitch_rate, vertical_velocity
 from rewards.posture import flat_orientation
 from rewards.schedules import StepSwitch
-from rewards.smoothness import action_rate
+from rewards.tables.crawl import REGULARIZERS
 
 PRECISION_STEPS = 12_000
 """Control steps per environment after which wrong keys cost more; ours."""
@@ -47,11 +45,6 @@ KEYBOARD: RewardTable = (
     RewardTerm("drift", support_drift, -30.0, ("support_pos_w", "support_start_w")),
     RewardTerm("slide", foot_slide, -1.0, ("support_vel_w", "support_force_n")),
     RewardTerm("tilt", flat_orientation, -2.0, ("gravity_v",)),
-    RewardTerm("undesired_contact", undesired_contact, -1.0, ("link_contact",)),
-    RewardTerm("vertical_velocity", vertical_velocity, -2.0, ("vel_v",)),
-    RewardTerm("roll_pitch_rate", roll_pitch_rate, -0.05, ("angvel_v",)),
-    RewardTerm("action_rate", action_rate, -0.01, ("action", "previous_action")),
-    RewardTerm("torque", torque, -2.5e-5, ("torque_nm",)),
-    RewardTerm("joint_acceleration", joint_acceleration, -2.5e-7, ("joint_acc",)),
+    *REGULARIZERS,
 )
 """The goals and penalties of keyboard pressing (paper) with weights of ours."""

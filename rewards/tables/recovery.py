@@ -13,10 +13,9 @@ and contacts of links, which it cannot avoid, cost little beside the crawl task'
 
 from rewards.compose import RewardTable, RewardTerm
 from rewards.contact import undesired_contact
-from rewards.effort import joint_acceleration, torque
 from rewards.motion import roll_pitch_rate
-from rewards.smoothness import action_rate
 from rewards.stance import level_height, palm_tilt, stance_pose
+from rewards.tables.crawl import EFFORT
 
 RECOVERY: RewardTable = (
     RewardTerm("palm_tilt", palm_tilt, -0.2, ("gravity_v",)),
@@ -31,8 +30,6 @@ RECOVERY: RewardTable = (
     ),
     RewardTerm("undesired_contact", undesired_contact, -0.1, ("link_contact",)),
     RewardTerm("roll_pitch_rate", roll_pitch_rate, -0.01, ("angvel_v",)),
-    RewardTerm("action_rate", action_rate, -0.01, ("action", "previous_action")),
-    RewardTerm("torque", torque, -2.5e-5, ("torque_nm",)),
-    RewardTerm("joint_acceleration", joint_acceleration, -2.5e-7, ("joint_acc",)),
+    *EFFORT,
 )
 """The goals of fall recovery (paper) with weights of ours."""

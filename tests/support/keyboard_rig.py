@@ -28,11 +28,12 @@ from envs.tasks.keyboard.stance import (
     FINGER_INDEX,
     JOINTS,
     PLACEMENT,
+    TIP_RADIUS_M,
     keyboard_stance,
 )
 from fingers_robot.simulator.command_path import CommandPath
 
-TIP_RADIUS_M, LIFT_M = 0.0075, 0.010
+LIFT_M = 0.010
 STEP_RAD = KeyboardConfig().action_scale_rad
 SUBSTEPS = 4
 
