@@ -5,10 +5,13 @@ the gains of its servo and the effects (of `envs.actuator.effects`) that the sim
 already has. Each figure has a tolerance within which it may differ without being news.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
+
+import numpy as np
+from jaxtyping import Float, Int
 
 from envs.actuator.catalogue import effect_kind
 from envs.config.typed import load_yaml
@@ -165,6 +168,56 @@ def hand_mechanism(hand: HandFile | None = None) -> Mechanism:
         for index, link in enumerate(hand.nominal.links)
     }
     return Mechanism(model, drives, _hand_classes(), hand)
+
+
+def joint_range(mechanism: Mechanism, joint: str) -> tuple[float, float]:
+    """Returns the range of a joint [rad]; ±π where the model has none."""
+    found = mechanism.model.joint(joint)
+    if not mechanism.model.jnt_limited[found.id]:
+        return -np.pi, np.pi
+    low, high = mechanism.model.jnt_range[found.id]
+    return float(low), float(high)
+
+
+def rest_posture(mechanism: Mechanism) -> Float[np.ndarray, " j"]:
+    """q_j = clip(0, low_j, high_j): where joints stand that do not move [rad].
+
+    Source:
+        Ours: at 0, or at the end of the range that is nearest to it.
+    """
+    ranges = [joint_range(mechanism, joint) for joint in mechanism.joints]
+    return np.array([np.clip(0.0, low, high) for low, high in ranges])
+
+
+def joint_groups(mechanism: Mechanism, names: Sequence[str]) -> list[tuple[str, ...]]:
+    """Returns joints one by one, and classes (a finger, `pip`, …) as groups.
+
+    Raises:
+        InputError: a name that is neither.
+    """
+    groups: list[tuple[str, ...]] = []
+    for name in names or mechanism.joints:
+        if name in mechanism.classes:
+            groups.append(tuple(mechanism.classes[name]))
+        elif name in mechanism.joints:
+            groups.append((name,))
+        else:
+            valid = one_of([*mechanism.joints, *mechanism.classes], name)
+            raise InputError("plan", "joints", name, valid)
+    return groups
+
+
+def joint_address(
+    mechanism: Mechanism,
+) -> tuple[Int[np.ndarray, " j"], Int[np.ndarray, " j"]]:
+    """a, d with q_j = qpos[a_j] and q̇_j = qvel[d_j], indices of the joints [1].
+
+    Source:
+        MuJoCo documentation, `mjModel.jnt_qposadr` and `jnt_dofadr`.
+    """
+    model = mechanism.model
+    ids = [model.joint(joint).id for joint in mechanism.joints]
+    return model.jnt_qposadr[ids], model.jnt_dofadr[ids]
 
 
 def _hand_drive(hand: HandFile, index: int) -> JointDrive:

@@ -49,7 +49,7 @@ def finger_log() -> MeasuredLog:
     """Records the finger."""
     rng = np.random.default_rng(SEED)
     stand = make_stand("finger", rng, lowpass_hz=3.0)
-    rounds = standard(rng, stand.middle, stand.reach, RATE_HZ, ROUND_S, ROUNDS, False)
+    rounds = standard(rng, stand.middle, stand.reach, RATE_HZ, ROUND_S, ROUNDS)
     truth = slightly_wrong(stand.mechanism, rng)
     for joint in stand.moved:
         truth = truth.with_effect(joint, "deadband", half_width_rad=HALF_WIDTH_RAD)

@@ -49,8 +49,7 @@ def made(kind: str, seed: int):
     rng = np.random.default_rng([seed, 3])
     stand = make_stand(kind, rng)
     rate_hz, round_s = RECORDS[kind]
-    alone = len(stand.moved) == 1
-    rounds = standard(rng, stand.middle, stand.reach, rate_hz, round_s, 3, alone)
+    rounds = standard(rng, stand.middle, stand.reach, rate_hz, round_s, 3)
     truth = slightly_wrong(stand.mechanism, rng)
     truth = truth.with_effect(stand.moved[-1], "backlash", gap_rad=GAP_RAD)
     quat_w = stand.mechanism.base_quat_w

@@ -58,24 +58,24 @@ def run(args: argparse.Namespace) -> int:
     """Plans an excitation and reports what it shows."""
     from sysid.excitation.check import fitting_plan
     from sysid.excitation.files import separation_lines, write_plan
-    from sysid.excitation.plan import Limits, joint_groups
+    from sysid.excitation.plan import Limits, Schedule
     from sysid.excitation.separation import separation
     from sysid.excitation.waves import WAVES
+    from sysid.mechanism import joint_groups
 
     mechanism = records.mechanism_of(args)
     limits = Limits(
         speed_rad_s=args.speed, torque_share=args.torque_share, reach_rad=args.reach
     )
-    plan, found = fitting_plan(
-        mechanism,
-        joint_groups(mechanism, args.joints),
-        waves=args.waves or tuple(WAVES),
+    schedule = Schedule(
+        waves=tuple(args.waves or WAVES),
         rate_hz=args.rate,
         repeats=args.repeats,
-        seed=args.seed,
-        limits=limits,
         stretch=args.stretch,
+        seed=args.seed,
     )
+    groups = joint_groups(mechanism, args.joints)
+    plan, found = fitting_plan(mechanism, groups, schedule, limits)
     shown = []
     for joint in () if args.no_effects else plan.moved:
         shown.append(separation(mechanism, plan, joint))

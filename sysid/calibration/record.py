@@ -7,10 +7,9 @@ from jaxtyping import Bool, Float
 
 from envs.errors import InputError
 from sysid.calibration.neighbours import Neighbours, neighbours_along
-from sysid.excitation.plan import rest_posture
 from sysid.logs.log import MeasuredLog
 from sysid.logs.timing import timing
-from sysid.mechanism import Mechanism
+from sysid.mechanism import Mechanism, rest_posture
 from sysid.rigid import at_rest, bodies_along, mount_gravity
 
 STEP_S, BLOCK_S = 0.001, 1.0

@@ -2,7 +2,7 @@
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import jax
@@ -14,8 +14,8 @@ from envs.actuator.catalogue import effect_kind
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
-from sysid.excitation.plan import Limits, Plan, joint_address, joint_range, make_plan
-from sysid.mechanism import Mechanism
+from sysid.excitation.plan import Limits, Plan, Schedule, make_plan
+from sysid.mechanism import Mechanism, joint_address, joint_range
 
 STEP_S = 0.001
 _SHRINK = 0.75
@@ -41,7 +41,10 @@ class Rehearsal:
 
 
 def fitting_plan(
-    mechanism: Mechanism, groups: Sequence[Sequence[str]], **options
+    mechanism: Mechanism,
+    groups: Sequence[Sequence[str]],
+    schedule: Schedule,
+    limits: Limits,
 ) -> tuple[Plan, Rehearsal]:
     """Makes a plan whose rehearsal stays within all limits.
 
@@ -50,18 +53,20 @@ def fitting_plan(
 
     Args:
         mechanism: the simulation as it stands.
-        groups: as in `make_plan`.
-        **options: further arguments of `make_plan`.
+        groups: joints that move at the same time, one group after the other.
+        schedule: which waves, how long and how often.
+        limits: what to keep to.
 
     Raises:
         InputError: a wave that leaves a limit even when it is small.
     """
     scales: dict[tuple[str, str], float] = {}
-    once = {**options, "repeats": 1}
+    once = replace(schedule, repeats=1)
     for _ in range(_MAX_ROUNDS):
-        found = rehearse(mechanism, make_plan(mechanism, groups, scales=scales, **once))
+        plan = make_plan(mechanism, groups, once, limits, scales)
+        found = rehearse(mechanism, plan)
         if not found.broken:
-            return make_plan(mechanism, groups, scales=scales, **options), found
+            return make_plan(mechanism, groups, schedule, limits, scales), found
         for wave, joint in {(wave, joint) for wave, joint, _ in found.broken}:
             scales[wave, joint] = scales.get((wave, joint), 1.0) * _SHRINK
     wave, joint, what = found.broken[0]

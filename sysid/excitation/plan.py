@@ -13,9 +13,8 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError, one_of
-from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.waves import WAVES
-from sysid.mechanism import Mechanism
+from sysid.mechanism import Mechanism, joint_range, rest_posture
 
 REST_S = 0.5
 """Rest before every wave, so that it begins the same in every repeat."""
@@ -36,6 +35,25 @@ class Limits:
     speed_rad_s: float = 4.0
     torque_share: float = 0.9
     reach_rad: float = 0.5
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """What is sent.
+
+    Attributes:
+        waves: names of waves, in order.
+        rate_hz: rate at which targets are sent.
+        repeats: how often each wave is repeated exactly.
+        stretch: factor on the usual length of the waves.
+        seed: of steps and phases, which differ between the joints of a group.
+    """
+
+    waves: tuple[str, ...] = tuple(WAVES)
+    rate_hz: float = 100.0
+    repeats: int = 3
+    stretch: float = 1.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -93,65 +111,65 @@ class Plan:
 def make_plan(
     mechanism: Mechanism,
     groups: Sequence[Sequence[str]],
-    waves: Sequence[str] = tuple(WAVES),
-    rate_hz: float = 100.0,
-    repeats: int = 3,
-    seed: int = 0,
-    limits: Limits | None = None,
+    schedule: Schedule = Schedule(),
+    limits: Limits = Limits(),
     scales: Mapping[tuple[str, str], float] | None = None,
-    stretch: float = 1.0,
 ) -> Plan:
     """Makes a plan.
 
     Args:
         mechanism: joints and their ranges.
         groups: joints that move at the same time, one group after the other.
-        waves: names of waves.
-        rate_hz: rate at which targets are sent.
-        repeats: how often each wave is repeated exactly.
-        seed: of steps and phases, which differ between the joints of a group.
+        schedule: which waves, how long and how often.
         limits: what to keep to.
         scales: factor on the amplitude by (wave, joint), for a plan made smaller.
-        stretch: factor on the usual length of the waves.
 
     Raises:
         InputError: unknown joint or wave, or a joint without room to move.
     """
-    limits, scales = limits or Limits(), scales or {}
-    _check(mechanism, groups, waves)
-    rest = rest_posture(mechanism)
-    column = {joint: i for i, joint in enumerate(mechanism.joints)}
+    _check(mechanism, groups, schedule.waves)
+    rest, rate_hz = rest_posture(mechanism), schedule.rate_hz
     parts, segments, rows = [], [], 0
     for group in groups:
-        centers = {j: _room(mechanism, j, limits) for j in group}
-        for name in waves:
-            wave = WAVES[name]
-            seconds = wave.seconds * stretch
+        rooms = {j: _room(mechanism, j, limits) for j in group}
+        for name in schedule.waves:
+            seconds = WAVES[name].seconds * schedule.stretch
             once = np.tile(rest, (round((seconds + REST_S) * rate_hz), 1))
             amplitudes = {}
-            for joint in group:
-                rng = np.random.default_rng([seed, column[joint], _number(name)])
-                shape = wave.shape(seconds, rate_hz, rng)
-                middle, reach = centers[joint]
-                size = wave.share * reach * scales.get((name, joint), 1.0)
-                if not wave.jumps:
-                    fastest = np.max(np.abs(np.diff(shape))) * rate_hz
-                    size = min(size, limits.speed_rad_s / max(fastest, 1e-9))
-                amplitudes[joint] = float(size)
-                once[:, column[joint]] = middle
-                once[len(once) - len(shape) :, column[joint]] += size * shape
-            for repeat in range(repeats):
+            for joint, (middle, reach) in rooms.items():
+                column = mechanism.joints.index(joint)
+                shape = _shape(schedule, name, column)
+                size = reach * (scales or {}).get((name, joint), 1.0)
+                size = _amplitude(name, shape, size, limits.speed_rad_s / rate_hz)
+                amplitudes[joint] = size
+                once[:, column] = middle
+                once[len(once) - len(shape) :, column] += size * shape
+            for repeat in range(schedule.repeats):
                 start = rows / rate_hz
                 parts.append(once)
                 rows += len(once)
                 segment = (tuple(group), repeat, start + REST_S, rows / rate_hz)
                 segments.append(Segment(name, *segment, amplitudes))
-    targets = _joined(parts, limits, rate_hz)
+    targets, seed = _joined(parts, rate_hz), schedule.seed
     return Plan(mechanism.joints, rate_hz, targets, tuple(segments), limits, seed)
 
 
-def _number(wave: str) -> int:
-    return list(WAVES).index(wave)
+def _shape(schedule: Schedule, name: str, column: int) -> Float[np.ndarray, " n"]:
+    """A wave between -1 and 1, drawn for one joint."""
+    wave = WAVES[name]
+    rng = np.random.default_rng([schedule.seed, column, list(WAVES).index(name)])
+    return wave.shape(wave.seconds * schedule.stretch, schedule.rate_hz, rng)
+
+
+def _amplitude(
+    name: str, shape: Float[np.ndarray, " n"], reach: float, step_rad: float
+) -> float:
+    """Share of the reach that a wave takes, without steps that are too large."""
+    wave = WAVES[name]
+    size = wave.share * reach
+    if not wave.jumps:
+        size = min(size, step_rad / max(np.max(np.abs(np.diff(shape))), 1e-9))
+    return float(size)
 
 
 def _check(mechanism: Mechanism, groups, waves) -> None:
@@ -166,21 +184,6 @@ def _check(mechanism: Mechanism, groups, waves) -> None:
         raise InputError("plan", "waves", "nothing to do", "at least one joint, wave")
 
 
-def joint_range(mechanism: Mechanism, joint: str) -> tuple[float, float]:
-    """Returns the range of a joint [rad]; ±π where the model has none."""
-    found = mechanism.model.joint(joint)
-    if not mechanism.model.jnt_limited[found.id]:
-        return -np.pi, np.pi
-    low, high = mechanism.model.jnt_range[found.id]
-    return float(low), float(high)
-
-
-def rest_posture(mechanism: Mechanism) -> Float[np.ndarray, " j"]:
-    """Returns where joints stand that do not move: at 0, or the end nearest to it."""
-    ranges = [joint_range(mechanism, joint) for joint in mechanism.joints]
-    return np.array([np.clip(0.0, low, high) for low, high in ranges])
-
-
 def _room(mechanism: Mechanism, joint: str, limits: Limits) -> tuple[float, float]:
     """Returns middle and reach of a joint's motion [rad]."""
     low, high = joint_range(mechanism, joint)
@@ -192,7 +195,7 @@ def _room(mechanism: Mechanism, joint: str, limits: Limits) -> tuple[float, floa
     return float(np.clip(0.5 * (low + high), low + reach, high - reach)), reach
 
 
-def _joined(parts: list, limits: Limits, rate_hz: float) -> Float[np.ndarray, "n j"]:
+def _joined(parts: list, rate_hz: float) -> Float[np.ndarray, "n j"]:
     """Joins waves; where the posture changes it glides during the rest."""
     targets = np.concatenate(parts)
     starts = np.cumsum([len(part) for part in parts])[:-1]
@@ -203,28 +206,3 @@ def _joined(parts: list, limits: Limits, rate_hz: float) -> Float[np.ndarray, "n
             share = 0.5 - 0.5 * np.cos(np.pi * np.arange(rows) / rows)
             targets[start : start + rows] = before + share[:, None] * (after - before)
     return targets
-
-
-def joint_groups(mechanism: Mechanism, names: Sequence[str]) -> list[tuple[str, ...]]:
-    """Returns joints one by one, and classes (a finger, `pip`, …) as groups.
-
-    Raises:
-        InputError: a name that is neither.
-    """
-    groups = []
-    for name in names or mechanism.joints:
-        if name in mechanism.classes:
-            groups.append(tuple(mechanism.classes[name]))
-        elif name in mechanism.joints:
-            groups.append((name,))
-        else:
-            valid = one_of([*mechanism.joints, *mechanism.classes], name)
-            raise InputError("plan", "joints", name, valid)
-    return groups
-
-
-def joint_address(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray]:
-    """Returns where the joints stand in qpos and qvel."""
-    model: mujoco.MjModel = mechanism.model
-    ids = [model.joint(joint).id for joint in mechanism.joints]
-    return model.jnt_qposadr[ids], model.jnt_dofadr[ids]

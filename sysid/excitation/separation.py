@@ -15,28 +15,19 @@ looked up: another plan, load or gain gives other figures.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import partial
 
-import jax
-import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import EffectKind
-from envs.actuator.joint import joint_step
-from envs.actuator.surroundings import Surroundings
+from sysid.excitation.bench import JointBench, joint_bench
 from sysid.excitation.check import STEP_S
 from sysid.excitation.plan import Plan
 from sysid.mechanism import JointDrive, Mechanism
-from sysid.rigid import at_rest, bodies_along
 
 NEEDED_NAT = 6.0
 """Evidence from which on an effect counts as seen, or as told apart."""
-
-SETTLE_ROWS = 100
-"""Rows at the first targets before the record begins: what an effect does at rest."""
 
 NO_LIMIT = 1e6
 """Stands for infinity in parameters whose effect vanishes there."""
@@ -107,15 +98,13 @@ def separation(
         noise: of the log that will be written.
     """
     noise, drive = noise or Noise(), mechanism.drives[joint]
-    bench = _bench(mechanism, plan, joint)
+    bench = joint_bench(mechanism, plan, joint)
     kinds = _kinds(drive)
     rest, sizes = _base(drive, kinds), _sizes(drive, kinds, bench)
     bends = _bends(drive, rest)
     candidates = [rest, *bends, *sizes.values()]
-    stacked = _stacked(candidates)
-    records = _simulate(tuple(kinds), stacked, bench)
     scale = np.array([noise.angle_rad, noise.torque_nm])
-    flat = (np.asarray(records, dtype=float) / scale).reshape(len(candidates), -1)
+    flat = (bench.simulate(candidates) / scale).reshape(len(candidates), -1)
     changes = np.nan_to_num(flat - flat[0], posinf=0.0, neginf=0.0)
     return _compared(joint, changes[1 : 1 + len(bends)], changes, sizes, rest)
 
@@ -146,60 +135,6 @@ def _compared(joint, bends, changes, sizes, rest) -> Separation:
     return Separation(joint, names, tried, 0.5 * own, apart)
 
 
-@dataclass(frozen=True, eq=False)
-class _Bench:
-    """One joint on the way that the plan takes it.
-
-    Attributes:
-        targets: at every row [rad].
-        weight: torque of gravity [N·m].
-        stiffness: its change with the angle [N·m/rad].
-        around: gravity and the neighbour at every row.
-        inertia: of the joint [kg·m²].
-        kp, kd: gains.
-        repeat: substeps of a row.
-    """
-
-    targets: Float[np.ndarray, " n"]
-    weight: Float[np.ndarray, " n"]
-    stiffness: Float[np.ndarray, " n"]
-    around: Surroundings
-    inertia: float
-    kp: float
-    kd: float
-    repeat: int
-
-
-def _bench(mechanism: Mechanism, plan: Plan, joint: str) -> _Bench:
-    """Freezes the rigid bodies along the first repeat of the joint's waves."""
-    j = plan.joints.index(joint)
-    rows = np.zeros(len(plan.targets), dtype=bool)
-    for segment in plan.segments:
-        if joint in segment.joints and not segment.repeat:
-            start, stop = segment.start_s * plan.rate_hz, segment.stop_s * plan.rate_hz
-            rows[round(start) : round(stop)] = True
-    targets, drive = plan.targets[rows], mechanism.drives[joint]
-    pull = mechanism.model.opt.gravity
-    bodies = bodies_along(mechanism, plan.joints, at_rest(targets), pull)
-    other = j + 1 if j + 1 < targets.shape[1] else j - 1
-    beside = targets[:, other] if other >= 0 else np.zeros(len(targets))
-    around = Surroundings(
-        other_q=jnp.asarray(beside),
-        other_nm=jnp.zeros(len(targets)),
-        gravity=bodies.gravity_on(j),
-    )
-    return _Bench(
-        targets=targets[:, j],
-        weight=bodies.weight[:, j],
-        stiffness=bodies.weight_slope[:, j],
-        around=around,
-        inertia=float(np.mean(bodies.inertia[:, j])),
-        kp=drive.kp.value,
-        kd=drive.kd.value,
-        repeat=max(round(1.0 / plan.rate_hz / STEP_S), 1),
-    )
-
-
 def _kinds(drive: JointDrive) -> dict[str, EffectKind]:
     """Effects that a single joint shows; those of the drive come along."""
     names = [name for name, kind in CATALOGUE.items() if _local(kind)]
@@ -221,7 +156,7 @@ def _base(drive: JointDrive, kinds) -> dict[str, dict[str, float]]:
     return base
 
 
-def _sizes(drive: JointDrive, kinds, bench: _Bench) -> dict[str, dict]:
+def _sizes(drive: JointDrive, kinds, bench: JointBench) -> dict[str, dict]:
     """All effects one by one, each at a size that such a joint may have."""
     rest = _base(drive, kinds)
     speed = np.max(np.abs(np.diff(bench.targets))) / bench.repeat / STEP_S
@@ -261,47 +196,3 @@ def _bends(drive: JointDrive, rest) -> list[dict]:
             off = {**rest[name], key: figure.value * (1.0 + figure.tolerance)}
             bends.append({**rest, name: off})
     return bends
-
-
-def _stacked(candidates: list[dict]):
-    """Turns a list of parameter sets into one with arrays."""
-    return jax.tree.map(lambda *x: jnp.asarray(x, jnp.float32), *candidates)
-
-
-def _simulate(names: tuple[str, ...], stacked, bench: _Bench):
-    """Returns readings and efforts of all candidates (candidates, rows, 2)."""
-    rows = (bench.targets, bench.weight, bench.stiffness, bench.around)
-    rows = jax.tree.map(lambda x: jnp.asarray(x, jnp.float32), rows)
-    figures = (bench.inertia, bench.kp, bench.kd)
-    return _run(names, bench.repeat, stacked, rows, figures)
-
-
-@partial(jax.jit, static_argnames=("names", "repeat"))
-def _run(names, repeat, stacked, rows, figures):
-    """Simulates candidates; targets and surroundings are held over the substeps."""
-    inertia, kp, kd = figures
-
-    def single(parameters):
-        model = [(CATALOGUE[name], parameters[name]) for name in names]
-
-        def substep(carry, now):
-            states, q, v, _ = carry
-            target, load, stiffness, around = now
-            load = load + stiffness * (q - target)
-            joint = JointInput(target, q, v, load, kp, kd, around)
-            states, x = chain_step(model, states, joint, STEP_S)
-            q, v = joint_step(x, inertia, STEP_S)
-            return states, q, v, jnp.stack([x.reading, x.effort])
-
-        def row(carry, now):
-            carry = jax.lax.fori_loop(0, repeat, lambda _, c: substep(c, now), carry)
-            return carry, carry[-1]
-
-        start = rows[0][0]
-        states = init_states(model, start, start, STEP_S)
-        carry = (states, start, jnp.zeros(()), jnp.zeros(2))
-        first = jax.tree.map(lambda x: x[0], rows)
-        carry = jax.lax.fori_loop(0, SETTLE_ROWS, lambda _, c: row(c, first)[0], carry)
-        return jax.lax.scan(row, carry, rows)[1]
-
-    return jax.lax.map(single, stacked, batch_size=8)

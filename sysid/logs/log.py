@@ -128,14 +128,6 @@ class MeasuredLog:
     def __len__(self) -> int:
         return len(self.t_s)
 
-    def joint_array(self, quantity: str) -> Float[np.ndarray, "n joints"]:
-        """Returns a quantity of all joints in their order, NaN where none was read.
-
-        Raises:
-            InputError: the log has no such column for one of the joints.
-        """
-        return np.stack([self.column(f"{quantity}.{j}") for j in self.header.joints], 1)
-
     def column(self, name: str) -> Float[np.ndarray, " n"]:
         """Returns one column.
 

@@ -20,12 +20,15 @@ from benchmarks.diagnosis.hidden.stands import (
     make_stand,
     slightly_wrong,
 )
-from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
+from benchmarks.diagnosis.hidden.truth import Mechanism
 from sysid.logs.log import MeasuredLog
 
 RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
 SLOW = ("thermal_derating", "clock_drift", "packet_reorder")
 """Effects that a single round does not show, or not as the others do."""
+
+RATE_HZ = 200.0
+"""Rows of a recording in a second."""
 
 SETTLED_S = 0.5
 """Time after which a record does not depend on how the joint stood before [s]."""
@@ -62,9 +65,7 @@ def draw_case(
     magnitude: str = "medium",
     kind: str = "pendulum",
     round_s: float = 12.0,
-    rate_hz: float = 200.0,
     lowpass_hz: float | None = None,
-    noise: Noise | None = None,
 ) -> Case:
     """Draws a case.
 
@@ -75,17 +76,13 @@ def draw_case(
             motion never reaches.
         kind: stand.
         round_s: length of a round of the standard recording [s].
-        rate_hz: rows in a second.
         lowpass_hz: cutoff of the firmware; drawn from 3 and 15 Hz if not given.
-        noise: of the log.
     """
     rng = np.random.default_rng([seed, 1])
-    noise = noise or Noise()
+    noise = Noise()
     cutoff = lowpass_hz or float(rng.choice([3.0, 15.0]))
     stand = make_stand(kind, rng, cutoff)
-    once = standard(
-        rng, stand.middle, stand.reach, rate_hz, round_s, 1, len(stand.moved) == 1
-    )
+    once = standard(rng, stand.middle, stand.reach, RATE_HZ, round_s, 1)
     truth = base = slightly_wrong(stand.mechanism, rng)
     joint = int(rng.choice(stand.moved))
     if magnitude == "invisible":
@@ -97,7 +94,7 @@ def draw_case(
         size, ratio = find.size(RATIOS[magnitude])
         truth = find.hidden(truth, size)
     rounds = np.tile(once.targets, (3, 1))
-    whole = Recording(rate_hz, rounds, _parts(once, 3))
+    whole = Recording(RATE_HZ, rounds, _parts(once, 3))
     log = record(
         truth,
         whole,
@@ -209,8 +206,3 @@ class _Finder:
         if size < self.scale.least:
             return self.scale.least, self.ratio(self.scale.least)
         return size, reached
-
-
-def outside(effects: tuple[str, ...]) -> bool:
-    """Whether the catalogue lacks one of the effects."""
-    return any(name in OUTSIDE for name in effects)

@@ -36,9 +36,8 @@ def standard(
     rate_hz: float = 200.0,
     round_s: float = 15.0,
     rounds: int = 3,
-    alone: bool = True,
 ) -> Recording:
-    """Makes the standard recording.
+    """Makes the standard recording; joints that move beside others do other things.
 
     Args:
         rng: draws steps and phases.
@@ -47,8 +46,6 @@ def standard(
         rate_hz: rows in a second.
         round_s: length of a round [s].
         rounds: how often the round is repeated.
-        alone: whether the joints do the same at the same time (one of them moves) or
-            different things.
     """
     share = {
         "slow_triangle": 0.25,
@@ -61,6 +58,7 @@ def standard(
     names = list(share)
     rows = {name: round(x * round_s * rate_hz) for name, x in share.items()}
     columns, parts = [], []
+    alone = np.count_nonzero(reach) == 1
     for joint, amplitude in enumerate(reach):
         order = names if alone else names[joint % 6 :] + names[: joint % 6]
         made = [_SHAPES[name](rng, rows[name], rate_hz) for name in order]

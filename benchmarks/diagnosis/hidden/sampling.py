@@ -81,8 +81,6 @@ def record(
     recording: Recording,
     noise: Noise,
     rng: np.random.Generator,
-    names: tuple[str, ...] | None = None,
-    speed: bool = False,
     **header,
 ) -> MeasuredLog:
     """Simulates a recording and writes down what a host would have seen.
@@ -92,15 +90,13 @@ def record(
         recording: the targets.
         noise: what the host adds.
         rng: draws it.
-        names: names of the joints in the log; the links' if not given.
-        speed: whether speeds are logged too.
         **header: further fields of the log's header.
     """
     times = ticks(recording, noise, rng)
     taken = times + rng.normal(0.0, noise.stamp_s, times.size)
     start = recording.targets[0] + rng.normal(0.0, noise.start_rad, 1)
     motion = simulate(mechanism, times, recording.targets, start)
-    angle, torque, qd = (_read(mechanism, motion, taken, x) for x in _channels(motion))
+    angle, torque, _ = (_read(mechanism, motion, taken, x) for x in _channels(motion))
     shape = angle.shape
     lost = rng.random(shape) < noise.lost
     angle = angle + rng.normal(0.0, noise.angle_sd_rad, shape)
@@ -109,10 +105,8 @@ def record(
         "pos": _rounded(angle, noise.angle_lsb_rad),
         "tau": _rounded(torque, noise.torque_lsb_nm),
     }
-    if speed:
-        values["vel"] = qd + rng.normal(0.0, 0.02, shape)
     kept = _without_stalls(times, noise, rng)
-    names = names or tuple(link.name for link in mechanism.links)
+    names = tuple(link.name for link in mechanism.links)
     columns = {}
     for i, name in enumerate(names):
         columns[f"cmd.{name}"] = recording.targets[kept, i]

@@ -126,7 +126,7 @@ def twins(friction_of: int):
         stand, mechanism=plain, moved=(0, 1), middle=both[0], reach=both[1]
     )
     truth = plain.with_effect(friction_of, "coulomb_friction", torque_nm=0.03)
-    moves = standard(rng, *both, round_s=6.0, rounds=2, alone=False)
+    moves = standard(rng, *both, round_s=6.0, rounds=2)
     return stand, record(truth, moves, Noise(stalls=0), rng)
 
 

@@ -7,10 +7,17 @@ from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.check import fitting_plan, rehearse
 from sysid.excitation.files import separation_lines, write_plan
-from sysid.excitation.plan import Limits, joint_groups, make_plan, rest_posture
+from sysid.excitation.plan import Limits, Schedule, make_plan
 from sysid.excitation.separation import separation
 from sysid.excitation.waves import WAVES, multisine_lines
-from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
+from sysid.mechanism import (
+    Figure,
+    JointDrive,
+    hand_mechanism,
+    joint_groups,
+    model_mechanism,
+    rest_posture,
+)
 
 TWO_ARMS = """
 <mujoco><compiler angle="radian"/><worldbody>
@@ -63,7 +70,8 @@ def test_a_multisine_has_its_odd_lines_and_no_other():
 
 def test_repeats_are_exact_and_groups_move_alone():
     mechanism = arms()
-    plan = make_plan(mechanism, [("a",), ("b",)], ["steps", "ramps"], repeats=2)
+    twice = Schedule(("steps", "ramps"), repeats=2)
+    plan = make_plan(mechanism, [("a",), ("b",)], twice)
     assert plan.moved == ("a", "b")
     first, second = (s for s in plan.segments[:2])
     a, b = (round(s.start_s * 100) for s in (first, second))
@@ -73,13 +81,15 @@ def test_repeats_are_exact_and_groups_move_alone():
         still = 1 - plan.joints.index(segment.joints[0])
         inside = slice(round(segment.start_s * 100), round(segment.stop_s * 100))
         assert np.ptp(plan.targets[inside, still]) == 0.0
-    again = make_plan(mechanism, [("a",)], ["steps"], seed=3).targets
-    assert not np.array_equal(again, make_plan(mechanism, [("a",)], ["steps"]).targets)
+    steps, others = (Schedule(("steps",), seed=seed) for seed in (0, 3))
+    again = make_plan(mechanism, [("a",)], others).targets
+    assert not np.array_equal(again, make_plan(mechanism, [("a",)], steps).targets)
 
 
 def test_speed_position_and_torque_stay_inside():
     limits = Limits(speed_rad_s=1.5, margin_rad=0.1, reach_rad=0.4)
-    plan, found = fitting_plan(arms(limit=0.12), [("a",)], limits=limits, stretch=0.5)
+    short = Schedule(stretch=0.5)
+    plan, found = fitting_plan(arms(limit=0.12), [("a",)], short, limits)
     smooth = [s for s in plan.segments if not WAVES[s.wave].jumps]
     for s in smooth:
         rows = plan.targets[round(s.start_s * 100) : round(s.stop_s * 100), 0]
@@ -87,28 +97,28 @@ def test_speed_position_and_torque_stay_inside():
     assert np.max(np.abs(found.torque)) <= 0.9 * 0.12
     assert np.max(np.abs(found.speed)) <= 1.05 * 1.5
     assert np.max(np.abs(found.angle)) <= 1.5
-    free = make_plan(arms(limit=0.12), [("a",)], limits=limits, stretch=0.5)
+    free = make_plan(arms(limit=0.12), [("a",)], short, limits)
     assert rehearse(arms(limit=0.12), free).broken  # steps had to become smaller
     assert free.segments[9].amplitude_rad["a"] > plan.segments[9].amplitude_rad["a"]
 
 
 def test_collisions_make_motions_smaller_or_are_refused():
-    waves = ["slow_triangle"]
-    free, _ = fitting_plan(arms(), [("a",)], waves=waves, stretch=0.4)
+    slow = Schedule(("slow_triangle",), stretch=0.4)
+    free, _ = fitting_plan(arms(), [("a",)], slow, Limits())
     assert free.segments[0].amplitude_rad == {"a": 0.5}
-    near, found = fitting_plan(arms(apart=0.05), [("a",)], waves=waves, stretch=0.4)
+    near, found = fitting_plan(arms(apart=0.05), [("a",)], slow, Limits())
     # 3 cm of air at the end of 10 cm of arm
     assert 0.15 < near.segments[0].amplitude_rad["a"] < 0.35
     assert not any(found.touching)
     with pytest.raises(InputError, match="found a and b touch"):
-        fitting_plan(arms(apart=0.0205), [("a",)], waves=waves, stretch=0.4)
+        fitting_plan(arms(apart=0.0205), [("a",)], slow, Limits())
 
 
 def test_names_that_do_not_exist():
     with pytest.raises(InputError, match=r"joints: found elbow"):
         make_plan(arms(), [("elbow",)])
     with pytest.raises(InputError, match=r"waves: found chirps.*did you mean chirp"):
-        make_plan(arms(), [("a",)], ["chirps"])
+        make_plan(arms(), [("a",)], Schedule(("chirps",)))
     with pytest.raises(InputError, match="joints: found indx"):
         joint_groups(hand_mechanism(), ["indx"])
     hand = hand_mechanism()
@@ -126,8 +136,10 @@ def hand_figures():
 def test_what_a_plan_shows_follows_from_the_motion(tmp_path):
     """Slow motion shows friction and hides delay; without motion nothing shows."""
     mechanism = pendulum()
-    slow = make_plan(mechanism, [("servo",)], ["slow_triangle"], rate_hz=50)
-    rich, found = fitting_plan(mechanism, [("servo",)], stretch=0.4, rate_hz=50)
+    triangle = Schedule(("slow_triangle",), rate_hz=50)
+    slow = make_plan(mechanism, [("servo",)], triangle)
+    short = Schedule(rate_hz=50, stretch=0.4)
+    rich, found = fitting_plan(mechanism, [("servo",)], short, Limits())
     seen_slow = separation(mechanism, slow, "servo")
     seen_rich = separation(mechanism, rich, "servo")
     assert {"coulomb_friction", "deadband", "stiffness"} <= set(seen_slow.seen)

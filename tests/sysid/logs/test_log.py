@@ -21,8 +21,6 @@ def refused(match, columns=KNEE, t_s=T, joints=("knee",), **options):
 def test_a_log_keeps_readings_as_they_were():
     log = small_log()
     assert len(log) == 50
-    assert log.joint_array("pos").shape == (50, 2)
-    assert np.array_equal(log.joint_array("pos")[:, 1], log.column("pos.hip"))
     assert log.missing("tau.knee").sum() == 3
     times, values = log.samples("tau.knee")
     assert len(times) == 47

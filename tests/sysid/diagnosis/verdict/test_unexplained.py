@@ -37,7 +37,7 @@ def searched():
 def test_a_joint_is_pulled_from_below_or_above(other):
     rng = np.random.default_rng(3)
     stand = make_stand("finger", rng)
-    once = standard(rng, stand.middle, stand.reach, 200.0, 6.0, 1, False)
+    once = standard(rng, stand.middle, stand.reach, 200.0, 6.0, 1)
     truth = stand.mechanism.with_effect(
         1, "joint_coupling", other=other, stiffness_nm_rad=0.05
     )
