@@ -48,8 +48,15 @@ class Task:
     fresh: tuple[int, ...] = ()
     central: bool = False
 
-    def penalty(self, theta: np.ndarray) -> float:
-        """Squared distance from the prior's center."""
+    def penalty(self, theta: Float[np.ndarray, " n"]) -> float:
+        """Σ ((θ_i − θ⁰_i) / σ_i)² over the free coordinates [1].
+
+        Args:
+            theta: θ, in units of the coordinates [1].
+
+        Source:
+            −2 log of a Gaussian prior, without its constant.
+        """
         k = self.free
         return float(np.sum(((theta - self.center)[k] / self.deviation[k]) ** 2))
 
@@ -89,10 +96,10 @@ def fit_all(
     exact: int = 8,
     shared: dict[int, Float[np.ndarray, " r"]] | None = None,
 ) -> list[Fit]:
-    """Advances all fits together.
+    """θ̂ = argmin ‖W r(θ)‖² + Σ ((θ_i − θ⁰_i) / σ_i)² of every task, side by side.
 
     Args:
-        residual: weighted residuals of many candidates.
+        residual: weighted residuals W r of many candidates, of unit scatter [1].
         tasks: the fits.
         rounds: Levenberg-Marquardt steps.
         exact: number of fits, the best, whose whole Jacobian is found at the end.
@@ -100,6 +107,10 @@ def fit_all(
 
     Returns:
         One result per task.
+
+    Source:
+        D. W. Marquardt, "An Algorithm for Least-Squares Estimation of Nonlinear
+        Parameters", Journal of SIAM 11(2), 1963; two dampings a round are ours.
     """
     shared = shared or {}
     states = [_State(task) for task in tasks]

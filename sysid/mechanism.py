@@ -2,7 +2,7 @@
 
 A mechanism is the simulation as it stands: rigid bodies in MuJoCo, and for every joint
 the gains of its servo and the effects (of `envs.actuator.effects`) that the simulation
-already has. Each figure has a tolerance within which it may differ without being news.
+already has. Each nominal parameter has a tolerance within which it is as expected.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,14 +26,14 @@ Effort = Literal["tau", "cur", "duty", "none"]
 
 
 @dataclass(frozen=True)
-class Figure:
-    """A figure of the drive and how well it is known.
+class Nominal:
+    """A nominal parameter of the drive and how well it is known.
 
     Attributes:
-        value: the figure.
-        tolerance: largest relative deviation that is no news; for a figure of zero in
-            its own unit.
-        free: whether nothing is known of it: a fit may choose it, and that is no news.
+        value: of the parameter.
+        tolerance: largest relative deviation within the expected; for a value of zero
+            in its own unit.
+        free: whether nothing is known of it: a fit may choose any value.
     """
 
     value: float
@@ -50,19 +50,19 @@ class JointDrive:
         kd: velocity gain [N·m·s/rad, or N·s/m].
         kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
             the gain is the same in all records.
-        effort: column that tells the effort of the drive.
+        effort: column that holds the effort of the drive.
         effort_scale: N·m (or N) per unit of that column.
         effects: effects that the simulation has, with their parameters by name.
         known: `controller` where unknown forces push on the joint, `mechanics` where
             the law of the controller is not known: only that part is examined then.
     """
 
-    kp: Figure
-    kd: Figure
+    kp: Nominal
+    kd: Nominal
     kp_setting: str = ""
     effort: Effort = "tau"
-    effort_scale: Figure = field(default_factory=lambda: Figure(1.0, 0.02))
-    effects: dict[str, dict[str, Figure]] = field(default_factory=dict)
+    effort_scale: Nominal = field(default_factory=lambda: Nominal(1.0, 0.02))
+    effects: dict[str, dict[str, Nominal]] = field(default_factory=dict)
     known: Literal["both", "controller", "mechanics"] = "both"
 
     def __post_init__(self) -> None:
@@ -73,7 +73,7 @@ class JointDrive:
                     valid = one_of(known, parameter)
                     raise InputError("drive", f"effects.{name}", parameter, valid)
 
-    def figure(self, effect: str, name: str, absent: float) -> float:
+    def parameter(self, effect: str, name: str, absent: float) -> float:
         """Returns a parameter of an effect that the simulation has, else `absent`."""
         found = self.effects.get(effect, {}).get(name)
         return absent if found is None else found.value
@@ -113,7 +113,7 @@ class Mechanism:
         return tuple(self.drives)
 
     def is_slide(self, joint: str) -> bool:
-        """Tells whether a joint moves along a line."""
+        """Whether a joint moves along a line."""
         return self.model.joint(joint).type[0] == int(mujoco.mjtJoint.mjJNT_SLIDE)
 
 
@@ -225,15 +225,15 @@ def _hand_drive(hand: HandFile, index: int) -> JointDrive:
     link = hand.nominal.links[index]
     limit = link.force_limit * hand.torque_scale.per_joint()[index]
     return JointDrive(
-        kp=Figure(link.kp * hand.stiffness_scale.per_joint()[index]),
-        kd=Figure(link.kv * hand.damping_scale.per_joint()[index], 0.1),
+        kp=Nominal(link.kp * hand.stiffness_scale.per_joint()[index]),
+        kd=Nominal(link.kv * hand.damping_scale.per_joint()[index], 0.1),
         effects={
-            "transport_delay": {"delay_s": Figure(hand.delay_s.value)},
-            "lowpass_cutoff": {"cutoff_hz": Figure(hand.lowpass_hz.value)},
+            "transport_delay": {"delay_s": Nominal(hand.delay_s.value)},
+            "lowpass_cutoff": {"cutoff_hz": Nominal(hand.lowpass_hz.value)},
             "slew_limit": {
-                "speed_rad_s": Figure(float(hand.speed_limit.per_joint()[index]))
+                "speed_rad_s": Nominal(float(hand.speed_limit.per_joint()[index]))
             },
-            "torque_limit": {"limit_nm": Figure(float(limit))},
+            "torque_limit": {"limit_nm": Nominal(float(limit))},
         },
     )
 

@@ -25,7 +25,7 @@ class Cause:
         effect: name in the catalogue.
         where: a joint, or `flexion`, `abduction`, `pip`, `dip`, a finger, `all`.
         parameters: estimates by parameter name.
-        evidence: gain in log predictive density on held-out data [nat].
+        evidence: log-likelihood gain on held-out data [nat].
         other: the joint that pulls a coupled one; "" for all other effects.
     """
 
@@ -38,12 +38,12 @@ class Cause:
 
 @dataclass(frozen=True)
 class Alternative:
-    """A rival of a cause.
+    """Another explanation instead of a cause.
 
     Attributes:
         effect: name in the catalogue.
         score_gap: how much worse it predicts held-out data [nat].
-        distinguishable: whether these records tell it apart from the cause.
+        distinguishable: whether these records distinguish it from the cause.
         cause: in whose place it would be; "" where there is one cause only.
     """
 
@@ -80,11 +80,11 @@ class Diagnosis:
 
     Attributes:
         verdict: `none` nothing significant; `found` causes by name; `ambiguous` one of
-            several that these records cannot tell apart; `unexplained` something that
+            several that these records cannot distinguish; `unexplained` something that
             no effect of the catalogue explains; `not_observable` the records excite
             too little to say.
         causes: in order of gain.
-        alternatives: rivals of the first cause, nearest first.
+        alternatives: of the first cause, nearest first.
         gain: on held-out data; None without causes.
         residual_gains: the same for each residual: `position`, `controller`,
             `mechanics`.

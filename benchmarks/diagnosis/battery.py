@@ -145,7 +145,7 @@ def run_task(task: Task) -> Row:
 
 
 def _shown(task: Task, case: Case) -> bool:
-    """Tells whether a joint shows what is hidden, and stays within its range.
+    """Whether a joint shows what is hidden, and stays within its range.
 
     A light one cannot show some effects, however large they are, and others throw it
     about: the pendulum can, and has a wide one.
@@ -200,11 +200,11 @@ def _run(tasks: list[Task], workers: int, out: Path, seed: int) -> list[Row]:
     file = out / f"rows-{seed}.jsonl"
     lines = file.read_text().splitlines() if file.exists() else []
     done = {row.seed: row for row in map(Row.from_json, lines)}
-    left = [task for task in tasks if task.seed not in done]
+    missing = [task for task in tasks if task.seed not in done]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(workers, mp_context=context) as pool, open(file, "a") as f:
-        jobs = {pool.submit(run_task, task): task for task in left}
+        jobs = {pool.submit(run_task, task): task for task in missing}
         for job in as_completed(jobs):
             row = job.result()
             done[row.seed] = row

@@ -3,8 +3,8 @@
     python -m benchmarks.diagnosis.hidden_deadband --out deadband
 
 Writes `finger.parquet`, three rounds of the standard recording of a ring finger on a
-stand with noise and slightly wrong believed figures, and `real.yaml`, the hand of which
-every joint has that deadband: the stand-in for the hardware of README.md.
+stand with noise and slightly wrong nominal parameters, and `real.yaml`, the hand of
+which every joint has that deadband: the stand-in for the hardware of README.md.
 """
 
 import argparse

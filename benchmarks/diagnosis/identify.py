@@ -28,7 +28,7 @@ from sysid.calibration.record import joint_record
 from sysid.calibration.simulation import Motion
 from sysid.least_squares import Task, fit_all
 from sysid.logs.log import MeasuredLog, make_log
-from sysid.mechanism import Figure, JointDrive, model_mechanism
+from sysid.mechanism import JointDrive, Nominal, model_mechanism
 
 RATE_HZ, STEP_S, FINE_S = 500.0, 0.001, 0.000125
 CUTOFF_HZ = 20.0
@@ -93,7 +93,7 @@ def recorded(true: np.ndarray, rng: np.random.Generator, seconds: float) -> Meas
 def ours(log: MeasuredLog) -> np.ndarray:
     """Fits with this project."""
     model = mujoco.MjModel.from_xml_string(mjcf(NOMINAL, STEP_S))
-    drive = JointDrive(Figure(NOMINAL[0]), Figure(NOMINAL[1]))
+    drive = JointDrive(Nominal(NOMINAL[0]), Nominal(NOMINAL[1]))
     record = joint_record(model_mechanism(model, {"servo": drive}), log, "servo")
     motion = Motion([record], (NOMINAL[0], NOMINAL[1]), 1e6)
     motion.scales = [np.array([NOISE["pos"], NOISE["tau"]])]
@@ -198,7 +198,7 @@ def main() -> None:
 
 
 def summary(rows: list[dict]) -> dict[str, float]:
-    """Ratios of times and errors; first runs, which compile, are told apart."""
+    """Ratios of times and errors; first runs, which compile, are apart."""
 
     def of(tool: str, name: str) -> np.ndarray:
         return np.array([row[name] for row in rows if row["tool"] == tool])

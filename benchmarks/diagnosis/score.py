@@ -1,4 +1,4 @@
-"""What a battery of hidden cases says about a diagnosis, in the figures asked for.
+"""What a battery of hidden cases says about a diagnosis, in numbers.
 
 PYTHONPATH=.:tests python -m benchmarks.diagnosis.score ROWS.jsonl
 """
@@ -66,14 +66,14 @@ class Row:
 
     @property
     def named(self) -> set[str]:
-        """The first cause and what cannot be told from it."""
+        """The first cause and what cannot be distinguished from it."""
         return {*self.causes[:1], *self.rivals} if self.causes else set()
 
     @property
     def has_both(self) -> bool:
         """Whether the effects of a pair are causes, or named beside one.
 
-        One cause with its rivals stands for one effect only.
+        One cause with its alternatives stands for one effect only.
         """
         said = {*self.causes, *self.rivals, *self.others}
         return set(self.effects) <= said and len(self.causes) >= len(self.effects)
@@ -123,7 +123,7 @@ def _rate(hits: Iterable[bool]) -> dict[str, float | int]:
 
 
 def figures(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
-    """Returns all figures by name; a rate comes with the number of cases."""
+    """Returns all scores by name; a rate comes with the number of cases."""
     groups = {g: [r for r in rows if r.group == g] for g in _GROUPS}
     single = groups["single"]
     result = {}
@@ -192,7 +192,7 @@ def confusion(rows: Sequence[Row]) -> dict[str, Counter]:
 
 
 def report(rows: Sequence[Row]) -> str:
-    """Returns figures and confusion matrix as text."""
+    """Returns scores and confusion matrix as text."""
     lines = ["hidden effect -> what was named (first cause or verdict)"]
     for name, counts in sorted(confusion(rows).items()):
         found = ", ".join(f"{k} {n}" for k, n in counts.most_common())

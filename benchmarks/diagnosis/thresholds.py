@@ -1,10 +1,11 @@
-"""From which gain on is an effect more than chance? Effect-free records tell.
+"""From which gain on is an effect more than chance? Effect-free records show it.
 
     python -m benchmarks.diagnosis.thresholds --seed 1 --records 100
 
 Every effect is added to the simulation of effect-free records, as a search does first.
-Printed are the largest gains of a record, apart for figures that the simulation has and
-for effects that it lacks, and the gains that 5 % of the records exceed.
+Printed are the largest gains of a record, apart for nominal parameters that the
+simulation has and for effects that it lacks, and the gains that 5 % of the records
+exceed.
 """
 
 import argparse
@@ -34,12 +35,12 @@ def largest_gains(seed: int) -> dict:
     again = fit_models(problem, [()] * 3, [m.fit.theta for m in stage[:3]])
     base = min([base, *again], key=lambda m: m.fit.cost)
     samples = int(problem.counts().sum())
-    best = {"figure": (0.0, ""), "effect": (0.0, "")}
+    best = {"nominal": (0.0, ""), "effect": (0.0, "")}
     for model in stage:
         name = model.effects[-1]
-        kind = "figure" if problem.space.figured(name) else "effect"
+        kind = "nominal" if problem.space.figured(name) else "effect"
         best[kind] = max(best[kind], (gain_nat(base, model, samples), name))
-    return {"seed": seed, **best, "left": max(base.errors.tolist())}
+    return {"seed": seed, **best, "residual": max(base.errors.tolist())}
 
 
 def main() -> None:
@@ -57,7 +58,7 @@ def main() -> None:
             file.write(json.dumps(rows[-1]) + "\n")
             file.flush()
             print(rows[-1], flush=True)
-    for kind in ("figure", "effect"):
+    for kind in ("nominal", "effect"):
         gains = [row[kind][0] for row in rows]
         print(
             f"{kind}: 95 % below {np.quantile(gains, 0.95):.1f}, all {max(gains):.1f}"

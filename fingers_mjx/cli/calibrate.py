@@ -33,13 +33,13 @@ def run(args: argparse.Namespace) -> int:
     """Calibrates and writes what was found."""
     from envs.hand.hand_file import save_hand_file
     from sysid.calibration.calibrate import calibrate, calibrated_hand
-    from sysid.calibration.figures import write_figures
+    from sysid.calibration.plots import write_plots
 
     mechanism = records.mechanism_of(args)
-    found = calibrate(records.read(args.logs, args.map), mechanism, tell=print)
+    found = calibrate(records.read(args.logs, args.map), mechanism, report=print)
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "calibration.json").write_text(found.to_json(), encoding="utf-8")
-    write_figures(found, args.out)
+    write_plots(found, args.out)
     if mechanism.hand is not None:
         save_hand_file(calibrated_hand(mechanism.hand, found), args.out / "hand.yaml")
     print("\n".join(_lines(found)))

@@ -15,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Float
 from scipy.stats import t as student
 
 from envs.errors import InputError
@@ -54,7 +55,7 @@ class Calibration:
         return hashlib.sha256("".join(self.log_sha256).encode()).hexdigest()
 
     def to_json(self) -> str:
-        """Returns all figures with their intervals."""
+        """Returns all parameters with their intervals."""
         joints = {
             joint: {"rms": f.rms}
             | {n: [f.values[n], f.low[n], f.high[n]] for n in f.low}
@@ -72,14 +73,14 @@ class Calibration:
 def calibrate(
     logs: Sequence[MeasuredLog],
     mechanism: Mechanism,
-    tell: Callable[[str], object] = lambda text: None,
+    report: Callable[[str], object] = lambda text: None,
 ) -> Calibration:
     """Calibrates all joints that the records move, and the friction of the tips.
 
     Args:
         logs: records on a stand; those with a setting `normal_n` are loaded pulls.
         mechanism: the simulation as it stands.
-        tell: hears what is being done.
+        report: is called with what is being done.
 
     Raises:
         InputError: records that cannot be used, or that move nothing.
@@ -90,7 +91,7 @@ def calibrate(
     for joint in dict.fromkeys(j for log in moving for j in log.header.joints):
         chosen = [log for log in moving if _moves(log, joint)]
         if chosen:
-            tell(f"fitting {joint}")
+            report(f"fitting {joint}")
             fits[joint] = fit_joint(mechanism, chosen, joint)
     if not fits and not pulls:
         source = logs[0].source if logs else "logs"
@@ -106,7 +107,7 @@ def _moves(log: MeasuredLog, joint: str) -> bool:
 
 
 def _shared(mechanism: Mechanism, fits, pulls) -> dict[str, Estimate]:
-    """Figures that joints share."""
+    """Parameters that joints share."""
     abduction = set(mechanism.classes.get("abduction", ()))
     groups = {
         "delay_s": ("delay_s", "s", list(fits.values())),
@@ -123,11 +124,11 @@ def _shared(mechanism: Mechanism, fits, pulls) -> dict[str, Estimate]:
         ),
     }
     found = {}
-    for name, (figure, unit, chosen) in groups.items():
-        seen = [f for f in chosen if np.isfinite(f.low[figure])]
+    for name, (parameter, unit, chosen) in groups.items():
+        seen = [f for f in chosen if np.isfinite(f.low[parameter])]
         if seen:
-            values = np.array([f.values[figure] for f in seen])
-            spread = np.array([max(f.deviation(figure), 1e-12) for f in seen])
+            values = np.array([f.values[parameter] for f in seen])
+            spread = np.array([max(f.deviation(parameter), 1e-12) for f in seen])
             found[name] = weighed_mean(values, spread, unit)
     if pulls:
         values = np.array([pull.friction for pull in pulls])
@@ -136,11 +137,22 @@ def _shared(mechanism: Mechanism, fits, pulls) -> dict[str, Estimate]:
     return found
 
 
-def weighed_mean(values: np.ndarray, deviation: np.ndarray, unit: str) -> Estimate:
-    """Returns the weighed mean with a 95 % interval.
+def weighed_mean(
+    values: Float[np.ndarray, " k"], deviation: Float[np.ndarray, " k"], unit: str
+) -> Estimate:
+    """x̄ = Σ w_i x_i / Σ w_i with w_i = 1 / (s_i² + τ²), and its 95 % interval.
 
-    Weights 1 / (s_i² + τ²), with the scatter τ² between the joints that their own
-    deviations do not explain (DerSimonian and Laird 1986); Student's t for few.
+    τ² is the scatter between the values that their own deviations do not explain. Where
+    there is any, the interval takes Student's t for few values.
+
+    Args:
+        values: x_i [m, rad, s, 1, …], all of one unit.
+        deviation: standard errors s_i > 0 in that unit.
+        unit: its name.
+
+    Source:
+        R. DerSimonian, N. Laird, "Meta-Analysis in Clinical Trials", Controlled
+        Clinical Trials 7(3), 1986.
     """
     count = len(values)
     weight = deviation**-2.0
@@ -164,10 +176,10 @@ def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
     names, changes = figures().joint_names, {}
     gains = {"stiffness_scale": "stiffness", "damping_scale": "damping"}
     fits = {j: f for j, f in found.joints.items() if j in names}
-    for field, figure in gains.items():
+    for field, parameter in gains.items():
         if fits:
             old = getattr(hand, field)
-            changes[field] = _per_joint(old, names, fits, figure, source, True)
+            changes[field] = _per_joint(old, names, fits, parameter, source, True)
     if fits:
         speed = _per_joint(hand.speed_limit, names, fits, "speed_limit", source, False)
         changes["speed_limit"] = speed
@@ -180,17 +192,20 @@ def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
 
 
 def _per_joint(
-    old: JointQuantity, names, fits, figure: str, source: str, factor: bool
+    old: JointQuantity, names, fits, parameter: str, source: str, factor: bool
 ) -> JointQuantity:
-    """A figure of 20 joints, of which some were measured."""
+    """A parameter of 20 joints, of which some were measured."""
     was = old.per_joint()
     value, low, high = (dict(zip(names, was.tolist(), strict=True)) for _ in range(3))
     measured = []
     for joint, fit in fits.items():
-        if np.isfinite(fit.low[figure]):
+        if np.isfinite(fit.low[parameter]):
             scale = float(was[names.index(joint)]) if factor else 1.0
-            value[joint] = scale * fit.values[figure]
-            low[joint], high[joint] = scale * fit.low[figure], scale * fit.high[figure]
+            value[joint] = scale * fit.values[parameter]
+            low[joint], high[joint] = (
+                scale * fit.low[parameter],
+                scale * fit.high[parameter],
+            )
             measured.append(joint)
     if not measured:
         return old

@@ -1,7 +1,7 @@
 """Kinetic friction of a fingertip from loaded pulls.
 
 A tip that carries a known normal force is drawn along the floor at constant speed while
-a load cell tells the pull. While it slides, μ_k = F_pull / F_normal.
+a load cell measures the pull. While it slides, μ_k = F_pull / F_normal.
 """
 
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from sysid.logs.columns import FINGERS
 from sysid.logs.log import MeasuredLog
 
 SETTING = "normal_n"
-"""Setting of a log's header that marks a pull and tells the normal force [N]."""
+"""Setting of a log's header that marks a pull and states the normal force [N]."""
 
 _SLIDING_SHARE = 0.5
 _START, _END = 0.2, 0.05

@@ -1,9 +1,9 @@
 """Stiffness, damping, delay, cutoff and speed of one joint.
 
 The joint is simulated on the recorded targets (`sysid.calibration.simulation`) and its
-figures are moved until angle and, where it was logged, effort agree. Inertia, weight
+parameters are moved until angle and, where it was logged, effort agree. Inertia, weight
 and both frictions are fitted along within what is known of them, and neighbours move
-along, so that they bend nothing.
+along, so that they bias nothing.
 """
 
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ from sysid.least_squares import Task, fit_all, standard_errors
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import JointDrive, Mechanism
 
-FIGURES: tuple[str, ...] = (
+PARAMETERS: tuple[str, ...] = (
     "stiffness",
     "damping",
     "delay_s",
@@ -37,8 +37,8 @@ _ROUNDS, _STEP = 30, 0.01
 
 _FLOOR = np.array([0.012, 0.012, 0.012, 0.003, 0.0015])
 """Deviations of the logarithms below which nothing is believed: nobody knows when
-within a step the firmware acts, and a quarter of a millisecond bends stiffness by about
-a percent. Neighbours' own gains and forces of rotation are the rest."""
+within a step the firmware acts, and a quarter of a millisecond biases stiffness by
+about a percent. Neighbours' own gains and forces of rotation are the rest."""
 
 _NO_SPEED_LIMIT, _NO_TORQUE_LIMIT = 100.0, 1e6
 
@@ -49,7 +49,7 @@ class JointFit:
 
     Attributes:
         joint: its name.
-        values, low, high: by name in `FIGURES`; gains as factors of the drive's; NaN
+        values, low, high: by name in `PARAMETERS`; gains as factors of the drive's; NaN
             bounds for what the record does not show.
         rms: error of every channel, `pos` and, if logged, the effort.
         records: what was measured.
@@ -65,7 +65,7 @@ class JointFit:
     simulated: tuple[Float[np.ndarray, "n 2"], ...]
 
     def deviation(self, name: str) -> float:
-        """Returns half the interval's width over 1.96, in the figure's unit."""
+        """Returns half the interval's width over 1.96, in the parameter's unit."""
         return (self.high[name] - self.low[name]) / (2.0 * 1.96)
 
 
@@ -82,13 +82,13 @@ def fit_joint(
         valid = "targets that move the joint"
         raise InputError(logs[0].source, f"cmd.{joint}", "no motion", valid)
     drive = mechanism.drives[joint]
-    limit = drive.figure("torque_limit", "limit_nm", _NO_TORQUE_LIMIT)
+    limit = drive.parameter("torque_limit", "limit_nm", _NO_TORQUE_LIMIT)
     motion = Motion(records, (drive.kp.value, drive.kd.value), limit)
     theta, half = _solved(motion, _nominal(drive))
     servo = theta[SERVO]
     simulated = tuple(y[0] for y in motion.simulate(theta[None]))
     values, low, high = (
-        dict(zip(FIGURES, np.exp(x).tolist(), strict=True))
+        dict(zip(PARAMETERS, np.exp(x).tolist(), strict=True))
         for x in (servo, servo - half, servo + half)
     )
     rms = _rms(records, simulated)
@@ -137,9 +137,9 @@ def _starts(center: Float[np.ndarray, " n"]) -> Float[np.ndarray, "c n"]:
 
 def _nominal(drive: JointDrive) -> Float[np.ndarray, " 9"]:
     """Parameters of the drive as simulated so far."""
-    delay = max(drive.figure("transport_delay", "delay_s", 0.01), 1e-3)
-    cutoff = drive.figure("lowpass_cutoff", "cutoff_hz", 20.0)
-    speed = drive.figure("slew_limit", "speed_rad_s", _NO_SPEED_LIMIT)
+    delay = max(drive.parameter("transport_delay", "delay_s", 0.01), 1e-3)
+    cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", 20.0)
+    speed = drive.parameter("slew_limit", "speed_rad_s", _NO_SPEED_LIMIT)
     return np.concatenate([[0.0, 0.0], np.log([delay, cutoff, speed]), np.zeros(4)])
 
 

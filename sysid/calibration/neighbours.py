@@ -1,13 +1,13 @@
 """Joints that move along because another one accelerates.
 
 Their servos hold neighbours with finite stiffness, so a joint does not feel the mass
-matrix's diagonal but what is left of it:
+matrix's diagonal but a smaller inertia:
 
     A x_o + m x = Δt f_o,      A = M_oo + Δt diag(kd_o) / 2
     (M − mᵀ A⁻¹ m) x = Δt (f − mᵀ A⁻¹ f_o)
 
 with speed changes x of the joint and x_o of its neighbours, their servos' torques f_o
-and the coupling m = M_oj. Left out, it bends stiffness by up to a tenth. Neighbours
+and the coupling m = M_oj. Left out, it biases stiffness by up to a tenth. Neighbours
 have the gains that the simulation gives them.
 """
 
@@ -36,7 +36,7 @@ class Neighbours:
     Attributes:
         inertia: the joint's own, with its drive's [kg·m²].
         moved: A⁻¹ m, how much neighbours move along.
-        left: M − mᵀ A⁻¹ m without the joint's own inertia, ≤ 0 [kg·m²].
+        rest: M − mᵀ A⁻¹ m without the joint's own inertia, ≤ 0 [kg·m²].
         inverse: A⁻¹ [1/(kg·m²)].
         command: where their servos want to be [rad].
         kp, kd: of their servos.
@@ -44,7 +44,7 @@ class Neighbours:
 
     inertia: Float[np.ndarray, " m"]
     moved: Float[np.ndarray, "m k"]
-    left: Float[np.ndarray, " m"]
+    rest: Float[np.ndarray, " m"]
     inverse: Float[np.ndarray, "m k k"]
     command: Float[np.ndarray, "m k"]
     kp: Float[np.ndarray, " k"]
@@ -59,7 +59,7 @@ def neighbours_along(
     joint: str,
     dt: float,
 ) -> Neighbours:
-    """Finds what moves along with a joint.
+    """A = M_oo + Δt diag(kd_o) / 2 and A⁻¹ M_oj at every step; see the module.
 
     Args:
         mechanism: the simulation as it stands.
@@ -68,6 +68,9 @@ def neighbours_along(
         targets: targets of all joints at every step [rad].
         joint: whose neighbours.
         dt: step [s].
+
+    Source:
+        Ours: block elimination of the neighbours' speeds from the implicit step.
     """
     names = mechanism.joints
     j, steps = names.index(joint), len(targets[joint])
@@ -83,14 +86,14 @@ def neighbours_along(
         for o, drive in zip(others, drives, strict=True)
     ]
     rows = every * np.arange(len(matrices))
-    own, along, left, inverse = (
+    own, along, rest, inverse = (
         interpolated(rows, x, steps)
         for x in (matrices[:, j, j], moved, -np.sum(moved * coupling, 1), inverse)
     )
     return Neighbours(
         inertia=own,
         moved=along,
-        left=left,
+        rest=rest,
         inverse=inverse,
         command=np.stack(commands, 1) if commands else np.zeros((steps, 0)),
         kp=np.array([drive.kp.value for drive in drives]),

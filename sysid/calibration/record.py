@@ -43,18 +43,18 @@ class Record:
     neighbours: Neighbours
 
     def at_rows(self, steps: Float[np.ndarray, "c m k"]) -> Float[np.ndarray, "c n k"]:
-        """Reads simulated steps at the times of the rows."""
-        return np.stack([at_times(self.t_s, steps[..., i]) for i in (0, 1)], -1)
+        """y(t) = (1 − s) y_a + s y_{a+1} with a + s = t / Δt, at the times of the rows.
 
+        Args:
+            steps: simulated angle [rad] and effort [N·m] of candidates at all steps.
 
-def at_times(
-    t_s: Float[np.ndarray, " n"], steps: Float[np.ndarray, "c m"]
-) -> Float[np.ndarray, "c n"]:
-    """Reads simulated steps at any times [s]."""
-    place = np.clip(t_s / STEP_S, 0.0, steps.shape[1] - 1.001)
-    low = place.astype(int)
-    share = place - low
-    return (1.0 - share) * steps[:, low] + share * steps[:, low + 1]
+        Source:
+            Textbook linear interpolation.
+        """
+        place = np.clip(self.t_s / STEP_S, 0.0, steps.shape[1] - 1.001)
+        low = place.astype(int)
+        share = (place - low)[:, None]
+        return (1.0 - share) * steps[:, low] + share * steps[:, low + 1]
 
 
 def joint_record(mechanism: Mechanism, log: MeasuredLog, joint: str) -> Record:

@@ -2,7 +2,7 @@
 
 Stiffness, damping, delay, cutoff and speed limit are the servo's; inertia, weight, dry
 and viscous friction say what the servo works against. All of them are factors or
-figures whose logarithms are searched, but for the frictions.
+values whose logarithms are searched, but for the frictions.
 """
 
 from collections.abc import Sequence
@@ -45,28 +45,55 @@ class Motion:
         self.torque = max(torque, 0.01 * gains[0])
         self.scales = [np.array([1e-3, max(0.02 * self.torque, 1e-3)]) for _ in records]
 
-    def steps(self, thetas: Float[np.ndarray, "c 9"]) -> list[np.ndarray]:
+    def _steps(
+        self, thetas: Float[np.ndarray, "c 9"]
+    ) -> list[Float[np.ndarray, "c m 2"]]:
         """Angles and efforts of candidates at the steps of every record."""
-        figures = (*self.gains, self.limit, self.torque)
+        drive = (*self.gains, self.limit, self.torque)
         found = []
         for r in self.records:
             n = r.neighbours
             own = (r.held, r.load, r.load_slope, r.angle, n.inertia)
-            along = (n.moved, n.left, n.inverse, n.command)
+            along = (n.moved, n.rest, n.inverse, n.command)
             inputs = [jnp.asarray(x, jnp.float32) for x in (*own, *along)]
             out = _simulate(
-                jnp.asarray(thetas, jnp.float32), inputs, figures, (n.kp, n.kd)
+                jnp.asarray(thetas, jnp.float32), inputs, drive, (n.kp, n.kd)
             )
             found.append(np.asarray(out, dtype=float))
         return found
 
-    def simulate(self, thetas: Float[np.ndarray, "c 9"]) -> list[np.ndarray]:
-        """Angles and efforts of candidates at the rows of every record."""
-        pairs = zip(self.records, self.steps(thetas), strict=True)
+    def simulate(
+        self, thetas: Float[np.ndarray, "c 9"]
+    ) -> list[Float[np.ndarray, "c n 2"]]:
+        """I q̈ = τ(target, q, q̇) + w m · g − friction, at the rows of every record.
+
+        Args:
+            thetas: logarithms of the factors of stiffness and damping, of delay [s],
+                cutoff [Hz] and speed limit [rad/s], of the factors of inertia and
+                weight w; dry friction over the largest torque of gravity and viscous
+                friction over the velocity gain [1].
+
+        Returns:
+            Angle [rad] and effort [N·m] of every candidate, record by record.
+
+        Source:
+            *Fingers as Legs*, the calibration of Table I; the neighbours are ours.
+        """
+        pairs = zip(self.records, self._steps(thetas), strict=True)
         return [record.at_rows(steps) for record, steps in pairs]
 
     def residuals(self, thetas: Float[np.ndarray, "c 9"]) -> Float[np.ndarray, "c n"]:
-        """Weighted residuals, all records one after the other."""
+        """R = (y − ŷ(θ)) / s of every valid reading, all records one after the other.
+
+        Args:
+            thetas: candidates, see `simulate` [1].
+
+        Returns:
+            Residuals in units of the scatter s [1]; 0 where nothing was read.
+
+        Source:
+            Ours: the output error of one joint on its recorded targets.
+        """
         parts = []
         simulated = self.simulate(thetas)
         for r, y, scale in zip(self.records, simulated, self.scales, strict=True):
@@ -75,7 +102,14 @@ class Motion:
         return np.nan_to_num(np.concatenate(parts, 1), nan=1e3, posinf=1e3, neginf=-1e3)
 
     def weigh(self, residual: Float[np.ndarray, " n"]) -> None:
-        """Takes the scatter of a fit as the scatter of the readings."""
+        """S ← s √(mean r²) of every channel: a fit's scatter is that of the readings.
+
+        Args:
+            residual: r of the fit, as from `residuals` [1].
+
+        Source:
+            Textbook iteratively reweighted least squares.
+        """
         first = 0
         for i, r in enumerate(self.records):
             rest = residual[first : first + r.valid.size].reshape(r.valid.shape)
@@ -85,7 +119,11 @@ class Motion:
             self.scales[i] = self.scales[i] * np.maximum(factor, 1e-6)
 
     def blocks(self) -> Int[np.ndarray, " n"]:
-        """Number of the block of every residual."""
+        """B = ⌊t / 1 s⌋, the block of every residual, counted through all records [1].
+
+        Source:
+            Ours: errors of one second belong together, whatever their colour.
+        """
         parts, first = [], 0
         for r in self.records:
             number = first + (r.t_s // BLOCK_S).astype(int)
@@ -95,9 +133,9 @@ class Motion:
 
 
 @jax.jit
-def _simulate(thetas, inputs, figures, held_by):
+def _simulate(thetas, inputs, drive, held_by):
     """Simulates candidates; returns (candidates, steps, angle and effort)."""
-    kp, kd, limit, torque = figures
+    kp, kd, limit, torque = drive
 
     def single(theta):
         values = (
@@ -115,7 +153,7 @@ def _simulate(thetas, inputs, figures, held_by):
 
         def step(carry, now):
             states, q, v, others, speeds = carry
-            target, load, slope, about, inertia, moved, left, inverse, command = now
+            target, load, slope, about, inertia, moved, rest, inverse, command = now
             push = held_by[0] * (command - others) - held_by[1] * speeds
             load = weight * (load + slope * (q - about)) - moved @ push
             joint = JointInput(target, q, v, load, *gains)
@@ -123,13 +161,13 @@ def _simulate(thetas, inputs, figures, held_by):
             # Speeds stand between the angles: half the implicit damping takes the
             # drive's at the angle, which is right to second order in the step.
             half = 0.5 * x.damping
-            body = heavy * inertia + left
+            body = heavy * inertia + rest
             q, after = joint_step(replace(x, damping=half), body, STEP_S)
             effort = x.effort - half * (after - v)
             speeds = speeds + STEP_S * inverse @ push - moved * (after - v)
             others = others + STEP_S * speeds
-            told = jnp.stack([x.reading, effort])
-            return (states, q, after, others, speeds), told
+            read = jnp.stack([x.reading, effort])
+            return (states, q, after, others, speeds), read
 
         states = init_states(model, inputs[0][0], inputs[3][0], STEP_S)
         others = inputs[-1][0]

@@ -30,7 +30,7 @@ class Rehearsal:
     Attributes:
         angle, speed, torque: of the joints [rad], [rad/s], [N·m].
         touching: names of what touches first at each step, "" if nothing new does.
-        broken: (wave, joint, sentence) for every limit that is left.
+        broken: (wave, joint, sentence) for every limit that is exceeded.
     """
 
     angle: Float[np.ndarray, "n j"]
@@ -85,8 +85,8 @@ def rehearse(mechanism: Mechanism, plan: Plan) -> Rehearsal:
     data.qpos[qpos] = plan.targets[0]
     mujoco.mj_forward(model, data)
     known = _contacts(data)
-    commands = followed(mechanism, plan)
-    kp, kd, limit = drive_figures(mechanism)
+    commands = _followed(mechanism, plan)
+    kp, kd, limit = _drive_limits(mechanism)
     shape = commands.shape
     angle, speed, torque = (np.empty(shape) for _ in range(3))
     touching = []
@@ -104,21 +104,16 @@ def rehearse(mechanism: Mechanism, plan: Plan) -> Rehearsal:
     )
 
 
-def drive_figures(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _drive_limits(mechanism: Mechanism) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns kp, kd and torque limit of every joint."""
     drives = list(mechanism.drives.values())
-    limits = [
-        drive.effects["torque_limit"]["limit_nm"].value
-        if "torque_limit" in drive.effects
-        else np.inf
-        for drive in drives
-    ]
+    limits = [drive.parameter("torque_limit", "limit_nm", np.inf) for drive in drives]
     kp = np.array([drive.kp.value for drive in drives])
     kd = np.array([drive.kd.value for drive in drives])
     return kp, kd, np.array(limits)
 
 
-def followed(mechanism: Mechanism, plan: Plan) -> Float[np.ndarray, "n j"]:
+def _followed(mechanism: Mechanism, plan: Plan) -> Float[np.ndarray, "n j"]:
     """Returns what the servos follow: targets after the known command path."""
     steps = round(len(plan.targets) / plan.rate_hz / STEP_S)
     rows = (np.arange(steps) * STEP_S * plan.rate_hz).astype(int)
@@ -168,7 +163,7 @@ def _names(model: mujoco.MjModel, pair: tuple[int, int]) -> str:
 def _broken(mechanism, plan: Plan, found: Rehearsal) -> tuple:
     """Lists which wave of which joint leaves which limit."""
     limits, broken = plan.limits, []
-    _, _, torque_limits = drive_figures(mechanism)
+    _, _, torque_limits = _drive_limits(mechanism)
     for segment in plan.segments:
         if segment.repeat:
             continue

@@ -60,13 +60,13 @@ def _segment(segment) -> dict[str, Any]:
 
 
 def _shows(separation: Separation) -> Mapping[str, Any]:
-    """Smallest sizes that show, rivals, and what does not show."""
+    """Smallest sizes that show, their alternatives, and what does not show."""
     seen = {
         name: {
             "share_of_tried": round(separation.smallest[name], 4),
             "from": {k: _short(a) for k, (a, _) in separation.sizes[name].items()},
             "tried": {k: _short(b) for k, (_, b) in separation.sizes[name].items()},
-            "not_told_from": list(separation.confused(name)),
+            "indistinguishable_from": list(separation.confused(name)),
         }
         for name in separation.seen
     }
@@ -82,8 +82,8 @@ def separation_lines(separation: Separation) -> list[str]:
     """Says in lines what a plan shows of a joint."""
     lines = [f"{separation.joint}:"]
     for name in separation.seen:
-        rivals = separation.confused(name)
-        mixed = f"; not told from {', '.join(rivals)}" * bool(rivals)
+        others = separation.confused(name)
+        mixed = f"; not distinguished from {', '.join(others)}" * bool(others)
         size = _size(separation, name)
         lines.append(f"  {name} from {size} on{mixed}")
     hidden = [name for name in separation.effects if name not in separation.seen]

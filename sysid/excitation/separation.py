@@ -1,16 +1,16 @@
-"""Which effects a plan can show, and which it can tell apart, from the model itself.
+"""Which effects a plan can show, and which it distinguishes, from the model itself.
 
 Every effect is simulated at a small size on the plan's own targets. With the change y
-of the record, in deviations of its noise, and the changes S that known figures make
-when they move by their tolerances,
+of the record, in deviations of its noise, and the changes S that nominal parameters
+make when they move by their tolerances,
 
     seen(y)     = min_s ‖y − S s‖² + ‖s‖²
     apart(a, b) = min_{s,c} ‖y_a − c y_b − S s‖² + ‖s‖²
 
-half of which is the evidence in nat that the effect is there, and that it is a and not
-b at any size c. Evidence grows with the square of the size: so it tells the smallest
-size that shows, and what could stand for an effect that is barely clear. Nothing is
-looked up: another plan, load or gain gives other figures.
+half of which is the log-likelihood gain [nat] that the effect is there, and that it is
+a and not b at any size c. It grows with the square of the size, which gives the
+smallest size that shows, and what could stand for an effect that is barely clear. Nothing is
+looked up: another plan, load or gain gives other numbers.
 """
 
 from collections.abc import Mapping
@@ -27,13 +27,13 @@ from sysid.excitation.plan import Plan
 from sysid.mechanism import JointDrive, Mechanism
 
 NEEDED_NAT = 6.0
-"""Evidence from which on an effect counts as seen, or as told apart."""
+"""Log-likelihood gain from which on an effect counts as seen, or as distinguished."""
 
 NO_LIMIT = 1e6
 """Stands for infinity in parameters whose effect vanishes there."""
 
 CLEAR_NAT = 100.0
-"""Evidence of an effect at the size at which rivals are compared with it, at most."""
+"""Largest gain of an effect at the size at which alternatives are compared with it."""
 
 
 @dataclass(frozen=True)
@@ -101,23 +101,23 @@ def separation(
     bench = joint_bench(mechanism, plan, joint)
     kinds = _kinds(drive)
     rest, sizes = _base(drive, kinds), _sizes(drive, kinds, bench)
-    bends = _bends(drive, rest)
-    candidates = [rest, *bends, *sizes.values()]
+    nominals = _perturbed(drive, rest)
+    candidates = [rest, *nominals, *sizes.values()]
     scale = np.array([noise.angle_rad, noise.torque_nm])
     flat = (bench.simulate(candidates) / scale).reshape(len(candidates), -1)
     changes = np.nan_to_num(flat - flat[0], posinf=0.0, neginf=0.0)
-    return _compared(joint, changes[1 : 1 + len(bends)], changes, sizes, rest)
+    return _compared(joint, changes[1 : 1 + len(nominals)], changes, sizes, rest)
 
 
-def _compared(joint, bends, changes, sizes, rest) -> Separation:
-    """Projects the known figures out and compares what is left."""
+def _compared(joint, nominals, changes, sizes, rest) -> Separation:
+    """Projects the nominal parameters out and compares the rest."""
     names = tuple(sizes)
-    signs = changes[1 + len(bends) :]
-    gram = np.linalg.inv(bends @ bends.T + np.eye(len(bends)))
+    signs = changes[1 + len(nominals) :]
+    gram = np.linalg.inv(nominals @ nominals.T + np.eye(len(nominals)))
 
     def inner(a, b):
-        """Inner product after the known figures did what they can."""
-        return a @ b.T - (a @ bends.T) @ gram @ (bends @ b.T)
+        """Inner product orthogonal to what nominal parameters explain."""
+        return a @ b.T - (a @ nominals.T) @ gram @ (nominals @ b.T)
 
     products = inner(signs, signs)
     own = np.maximum(np.diag(products), 0.0)
@@ -150,7 +150,7 @@ def _base(drive: JointDrive, kinds) -> dict[str, dict[str, float]]:
     """Parameters of all effects in the simulation as it stands."""
     base = {name: kind.identity() for name, kind in kinds.items()}
     for name, values in drive.effects.items():
-        base[name] |= {key: figure.value for key, figure in values.items()}
+        base[name] |= {key: known.value for key, known in values.items()}
     for values in base.values():
         values |= {k: NO_LIMIT for k, v in values.items() if np.isinf(v)}
     return base
@@ -183,16 +183,16 @@ def _sizes(drive: JointDrive, kinds, bench: JointBench) -> dict[str, dict]:
     return sizes
 
 
-def _bends(drive: JointDrive, rest) -> list[dict]:
-    """The simulation with one known figure off by its tolerance."""
-    bends = []
+def _perturbed(drive: JointDrive, rest) -> list[dict]:
+    """The simulation with one nominal parameter off by its tolerance."""
+    nominals = []
     gains = {"stiffness": drive.kp, "damping": drive.kd}
-    for name, figure in gains.items():
+    for name, known in gains.items():
         if name in rest:
-            scale = {"scale": rest[name]["scale"] * (1.0 + figure.tolerance)}
-            bends.append({**rest, name: scale})
+            scale = {"scale": rest[name]["scale"] * (1.0 + known.tolerance)}
+            nominals.append({**rest, name: scale})
     for name, values in drive.effects.items():
-        for key, figure in values.items():
-            off = {**rest[name], key: figure.value * (1.0 + figure.tolerance)}
-            bends.append({**rest, name: off})
-    return bends
+        for key, known in values.items():
+            off = {**rest[name], key: known.value * (1.0 + known.tolerance)}
+            nominals.append({**rest, name: off})
+    return nominals

@@ -40,7 +40,14 @@ def _time(seconds: float, rate_hz: float) -> Float[np.ndarray, " n"]:
 
 
 def triangle(phase: Float[np.ndarray, " n"]) -> Float[np.ndarray, " n"]:
-    """Returns 0 → 1 → -1 → 0 over every unit of phase, straight in between."""
+    """2/π asin(sin 2πφ): 0 → 1 → -1 → 0 over every unit of phase, straight in between.
+
+    Args:
+        phase: φ, in periods [1].
+
+    Source:
+        Textbook triangle wave.
+    """
     return 2.0 / np.pi * np.arcsin(np.sin(2.0 * np.pi * phase))
 
 
@@ -113,7 +120,20 @@ def _multisine(seconds, rate_hz, rng):
 def multisine_lines(
     period_s: float, rate_hz: float, rng: np.random.Generator
 ) -> Float[np.ndarray, " n"]:
-    """Returns the excited lines, in units of 1 / period."""
+    """K ∈ {1, 3, 5, …, f_max T} less a random one of every four: the excited lines.
+
+    Args:
+        period_s: T [s].
+        rate_hz: of the targets; f_max is 8 Hz or a quarter of it [Hz].
+        rng: draws the lines that are left silent.
+
+    Returns:
+        k, in units of 1 / T [1].
+
+    Source:
+        J. Schoukens, M. Vaes, R. Pintelon, "Linear System Identification in a
+        Nonlinear Setting", IEEE Control Systems Magazine 36(3), 2016.
+    """
     top = min(HIGHEST_HZ, rate_hz / 4.0)
     odd = np.arange(1, max(int(top * period_s), 7) + 1, 2)
     groups = np.arange(odd.size) // 4

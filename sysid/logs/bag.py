@@ -178,7 +178,7 @@ def _messages(path: Path, bag_map: BagMap) -> Iterator[tuple[str, str, int, Any]
 
 @contextmanager
 def _opened(path: Path) -> Iterator[Any]:
-    """Opens a bag; whatever fails while it is read is told in one sentence."""
+    """Opens a bag; whatever fails while it is read is reported in one sentence."""
     from rosbags.rosbag2 import Reader
 
     try:

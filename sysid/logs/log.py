@@ -50,7 +50,7 @@ class LogHeader:
         mounting: `palm_fixed` to a stand, or `free`.
         palm_quat_w: orientation of a fixed palm in the world (w, x, y, z).
         load: what the joints carry.
-        settings: figures of the controller during the record, e.g. `{"kp": 200}`.
+        settings: parameters of the controller during the record, e.g. `{"kp": 200}`.
         note: free text, e.g. where the record comes from.
     """
 
@@ -129,23 +129,37 @@ class MeasuredLog:
         return len(self.t_s)
 
     def column(self, name: str) -> Float[np.ndarray, " n"]:
-        """Returns one column.
+        """y_t of one column, t = 1 … n, NaN where there was no reading.
+
+        Args:
+            name: of the column; its unit is in the header [rad, N·m, A, …].
 
         Raises:
             InputError: the log does not have it.
+
+        Source:
+            The record itself.
         """
         if name not in self.columns:
             raise InputError(self.source, "columns", name, one_of(self.columns, name))
         return self.columns[name]
 
     def missing(self, name: str) -> Bool[np.ndarray, " n"]:
-        """Returns in which rows a column has no reading."""
+        """y_t = NaN: in which rows a column has no reading [1].
+
+        Source:
+            The record itself.
+        """
         return np.isnan(self.column(name))
 
     def samples(
         self, name: str
     ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, " m"]]:
-        """Returns times [s] and values of the rows that have a reading."""
+        """(t_i, y_i) for all i ∈ {i : y_i ≠ NaN}: times [s] and values of the readings.
+
+        Source:
+            The record itself.
+        """
         kept = ~self.missing(name)
         return self.t_s[kept], self.column(name)[kept]
 
@@ -208,12 +222,12 @@ class MeasuredLog:
 
 def make_log(
     joints: tuple[str, ...],
-    t_s: np.ndarray,
-    columns: Mapping[str, np.ndarray],
+    t_s: Float[np.ndarray, " n"],
+    columns: Mapping[str, Float[np.ndarray, " n"]],
     units: Mapping[str, str] | None = None,
     **header,
 ) -> MeasuredLog:
-    """Makes a log from arrays in the usual units.
+    """Makes a log of columns y_t, t = t_1 … t_n, in the usual units.
 
     Args:
         joints: names of the joints.
@@ -224,6 +238,9 @@ def make_log(
 
     Raises:
         InputError: as `MeasuredLog`.
+
+    Source:
+        The caller's measurement.
     """
     source = header.pop("source", "log")
     check_columns(source, columns, joints)

@@ -43,8 +43,8 @@ _ROUNDS = 16
 
 _FLOOR = 0.3
 """Deviation of parameters, in units of their axes, below which nothing is
-believed: short walks start from measured states, whose noise and smoothing bend what
-they show (found on walks with known causes)."""
+believed: short walks start from measured states, whose noise and smoothing bias
+what they show (found on walks with known causes)."""
 
 _MEASURED = "floor_tilt"
 """Effect that IMU and camera measure together, without any simulation or slope."""
@@ -99,8 +99,19 @@ class Walk:
         scaled = [self._raw(theta) / self._scale / _ROBUST for theta in thetas]
         return np.stack([_ROBUST * np.arcsinh(x).ravel() for x in scaled])
 
-    def fit(self, free: tuple[int, ...], start: Float[np.ndarray, " k"], rounds: int):
-        """Fits some parameters from a start; the others stay at zero."""
+    def fit(
+        self, free: tuple[int, ...], start: Float[np.ndarray, " k"], rounds: int
+    ) -> Fit:
+        """θ̂ = argmin ‖r(θ)‖² + ‖θ / σ‖² over some parameters; the others stay at zero.
+
+        Args:
+            free: indices of the parameters.
+            start: their first values, in units of their axes [1].
+            rounds: Levenberg-Marquardt steps; 0 for the tangent at the start.
+
+        Source:
+            Ours; the solver is `sysid.least_squares.fit_all`.
+        """
         at = np.zeros(len(self.axes))
         at[list(free)] = start
         same = np.ones(len(at))
@@ -120,14 +131,14 @@ class Walk:
 def diagnose_walk(
     log: MeasuredLog,
     env: BatchEnv,
-    tell: Callable[[str], object] = lambda text: None,
+    report: Callable[[str], object] = lambda text: None,
 ) -> tuple[Diagnosis, list[Judged]]:
     """Compares a walk with the simulation and names the cause of the difference.
 
     Args:
         log: of a free hand; see `sysid.walking.record.walk_record`.
         env: worlds of a task with the hand of `sysid.walking.hypotheses.whole_hand`.
-        tell: hears what is being done.
+        report: is called with what is being done.
 
     Returns:
         The verdict, and the hypotheses that were fitted in full, best first.
@@ -136,7 +147,7 @@ def diagnose_walk(
         InputError: a log that cannot be used, in one sentence.
     """
     began = time.monotonic()
-    tell("simulating the hand as it is")
+    report("simulating the hand as it is")
     walk = Walk(log, env)
     count = len(walk.axes)
     tangent = walk.fit(tuple(range(count)), np.zeros(count), rounds=0)
@@ -145,7 +156,7 @@ def diagnose_walk(
     plain = _judged(walk, Hypothesis("", "", ()), 0.0, np.zeros(1))
     full = []
     for hypothesis in ranked[:FULL]:
-        tell(f"fitting {hypothesis.effect} of {hypothesis.where}")
+        report(f"fitting {hypothesis.effect} of {hypothesis.where}")
         start = _half_step(tangent, (0, *hypothesis.indices))
         full.append(_judged(walk, hypothesis, plain.gains, start))
     full.sort(key=lambda judged: -judged.gain)
@@ -168,8 +179,8 @@ def _linear_gains(walk: Walk, tangent: Fit, hypothesis: Hypothesis) -> np.ndarra
         costs = []
         for free in ((0,), (0, *hypothesis.indices)):
             step = _half_step(tangent, free, fit)
-            left = tangent.residual + tangent.jacobian[:, list(free)] @ step
-            costs.append(_costs(left, walk.block))
+            residual = tangent.residual + tangent.jacobian[:, list(free)] @ step
+            costs.append(_costs(residual, walk.block))
         gains[held] = 0.5 * (costs[0] - costs[1])[held]
     return gains
 

@@ -6,13 +6,14 @@ from typing import Any
 
 import jax.numpy as jnp
 import numpy as np
+from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.hand.figures import FINGERS
 from envs.hand.hand_file import Effect, HandFile, Quantity
 
 NUISANCE = "tip_friction"
-"""What every hypothesis may choose along: floors differ, and that is no news."""
+"""What every hypothesis may choose along: floors differ."""
 
 
 @dataclass(frozen=True)
@@ -93,9 +94,21 @@ def whole_hand(hand: HandFile) -> HandFile:
 
 
 def candidate(
-    theta: np.ndarray, all_axes: tuple[Axis, ...]
+    theta: Float[np.ndarray, " a"], all_axes: tuple[Axis, ...]
 ) -> Mapping[str, Mapping[str, Any]]:
-    """Parameters of all effects, as the simulation takes them."""
+    """p_i = u_i θ_i, or exp(u_i θ_i) where the identity is 1, by effect and name.
+
+    Args:
+        theta: coordinates, in units u_i of their axes [1].
+        all_axes: of the coordinates.
+
+    Returns:
+        Parameters as the simulation takes them: strength by joint (20), friction by
+        fingertip (5), the others alone [1, m, rad, rad/s].
+
+    Source:
+        Ours: factors vary by percents, not by amounts.
+    """
     found: dict[str, dict[str, Any]] = {}
     for x, axis in zip(theta, all_axes, strict=True):
         value: Any = axis.value(float(x))

@@ -33,9 +33,9 @@ class WalkRecord:
         dt: control interval [s].
         qpos: pose of the palm and joint angles.
         qvel: their velocities, angular velocity in the palm frame.
-        command: what MuJoCo's servos were told in each substep of a row [rad].
-        gravity: unit vector that the IMU told, in the palm frame.
-        gyro: what the gyro told [rad/s].
+        command: targets of MuJoCo's servos in each substep of a row [rad].
+        gravity: unit vector that the IMU measured, in the palm frame.
+        gyro: what the gyro measured [rad/s].
         turning: angular velocity of the pose, in the palm frame [rad/s].
     """
 

@@ -56,7 +56,18 @@ class Pieces:
         self._control = record.command[index].reshape(len(self.starts), -1, 20)
 
     def misses(self, candidate: Candidate) -> Float[np.ndarray, "p k c"]:
-        """Measured less simulated, in the heading of each piece's start."""
+        """y(t_0 + k Δt) − ŷ(t_0 + k Δt; θ) of every piece, k ∈ {5, 10} steps after t_0.
+
+        Args:
+            candidate: parameters θ by effect and name.
+
+        Returns:
+            By piece and k: forward, left, up [m], roll, pitch, yaw [rad], in the
+            heading at t_0, and 20 joints [rad].
+
+        Source:
+            Ours; multiple shooting of a chaotic system from measured states.
+        """
         model = self._model(candidate)
         states, _ = rollout.rollout(model, self._data, self._states, self._control)
         substeps = self.record.command.shape[1]
@@ -77,7 +88,7 @@ class Pieces:
 
     def _missed(self, simulated: np.ndarray, rows: np.ndarray) -> np.ndarray:
         measured = self.record.qpos[rows]
-        heading = yaw_of(self.record.qpos[self.starts, 3:7])
+        heading = _yaw_of(self.record.qpos[self.starts, 3:7])
         moved = measured[:, :3] - simulated[:, :3]
         ahead = np.cos(heading) * moved[:, 0] + np.sin(heading) * moved[:, 1]
         left = np.cos(heading) * moved[:, 1] - np.sin(heading) * moved[:, 0]
@@ -90,7 +101,7 @@ class Pieces:
         return np.concatenate([np.stack(parts, 1), joints], 1)
 
 
-def yaw_of(quat: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, " n"]:
+def _yaw_of(quat: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, " n"]:
     """Heading of poses [rad]."""
     w, x, y, z = quat.T
     return np.arctan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

@@ -12,7 +12,7 @@ from sysid.result import Alternative, Cause, Estimate, Gain
 from sysid.walking.hypotheses import Axis, Hypothesis
 
 SURE = 3.0
-"""Standard errors by which a held-out gain must exceed zero, or that of a rival."""
+"""Standard errors by which a held-out gain must exceed zero, or another one."""
 
 BOUND = 20.0
 """Largest value of a parameter in units of its axis."""
@@ -52,13 +52,19 @@ def verdict_of(
     plain: Judged,
     count: Int[np.ndarray, " b"],
 ) -> dict[str, Any]:
-    """Returns the fields of the diagnosis that the fits decide.
+    """ΔL > 3 √(n Var ΔL_b): names a cause whose gain exceeds three standard errors.
 
     Args:
         all_axes: all parameters.
         full: hypotheses, best first.
         plain: the hand as simulated; its gains are minus its costs.
-        count: residuals in every stretch.
+        count: residuals in every stretch [1].
+
+    Returns:
+        The fields of the diagnosis that the fits decide.
+
+    Source:
+        Ours: the gain in log-likelihood ΔL = Σ_b ΔL_b on held-out stretches [nat].
     """
     best, *rest = full
     if not _sure(best.gains):
@@ -78,13 +84,13 @@ def verdict_of(
     )
     near = [a for a in others if not a.distinguishable]
     cause = _cause(all_axes, best)
-    figures = ", ".join(
+    values = ", ".join(
         f"{k} {e.value:.3g} ({e.low:.3g} to {e.high:.3g}) {e.unit}"
         for k, e in cause.parameters.items()
     )
-    words = f"{cause.effect} of {cause.where}: {figures}."
+    words = f"{cause.effect} of {cause.where}: {values}."
     if near:
-        words += f" Not told apart from {', '.join(a.effect for a in near)}."
+        words += f" Not distinguished from {', '.join(a.effect for a in near)}."
     return {
         "verdict": "ambiguous" if near else "found",
         "causes": (cause,),
@@ -127,9 +133,9 @@ def _gain(count: np.ndarray, best: Judged, plain: Judged) -> Gain:
 
 
 def _next(effect: str, near: Sequence[Alternative]) -> str:
-    """The experiment that tells the cause from its nearest rival."""
+    """The experiment that distinguishes the cause from its nearest alternative."""
     if not near:
         return ""
-    rival = near[0].effect.split(" of ")[0]
-    known = CATALOGUE[effect].confusable_with.get(rival)
-    return known or f"walk in other directions: {effect} against {rival}"
+    other = near[0].effect.split(" of ")[0]
+    known = CATALOGUE[effect].confusable_with.get(other)
+    return known or f"walk in other directions: {effect} against {other}"

@@ -6,7 +6,7 @@ from benchmarks.diagnosis.hidden.cases import Case
 from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
 from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
 from benchmarks.diagnosis.hidden.truth import Joint
-from sysid.mechanism import Figure, JointDrive, Mechanism, model_mechanism
+from sysid.mechanism import JointDrive, Mechanism, Nominal, model_mechanism
 
 
 def believed(stand: Stand) -> Mechanism:
@@ -26,10 +26,10 @@ def _drive(joint: Joint) -> JointDrive:
         "torque_limit": {"limit_nm": (joint.limit_nm, "kp")},
     }
     return JointDrive(
-        kp=Figure(joint.kp, TOLERANCES["kp"]),
-        kd=Figure(joint.kd, TOLERANCES["kd"]),
+        kp=Nominal(joint.kp, TOLERANCES["kp"]),
+        kd=Nominal(joint.kd, TOLERANCES["kd"]),
         effects={
-            name: {key: Figure(v, TOLERANCES[t]) for key, (v, t) in values.items()}
+            name: {key: Nominal(v, TOLERANCES[t]) for key, (v, t) in values.items()}
             for name, values in path.items()
         },
     )
@@ -38,7 +38,7 @@ def _drive(joint: Joint) -> JointDrive:
 def true_parameters(case: Case, effect: str) -> dict[str, float]:
     """Returns what a perfect diagnosis would report, as far as it has one name.
 
-    Where the effect is another value of a believed figure, the figure's own error
+    Where the effect is another value of a nominal parameter, that one's own error
     belongs to it. Of a tilt, one joint shows one axis: only the pendulum's is known.
     """
     index = case.stand.names.index(case.joint)

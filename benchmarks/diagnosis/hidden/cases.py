@@ -1,7 +1,7 @@
 """Draws hidden cases: a stand, an effect of a given visibility, and the log of it.
 
 Visibility is the error on the recording that the believed model makes at best, over
-noise: believed figures are first moved within their tolerances as far as that helps.
+noise: nominal parameters are first moved within their tolerances as far as that helps.
 The beginning does not count: how a joint stands before the first target is not known.
 """
 
@@ -152,9 +152,9 @@ class _Finder:
         self.sigma = noise.deviations(speed)
         self.moved = list(stand.moved)
         self.plain = self._seen(base)
-        figures = [f for f in TOLERANCES if f != self.scale.release]
-        self.bends = np.stack([self._bend(figure) for figure in figures], 1)
-        gram = self.bends.T @ self.bends + np.eye(len(figures))
+        names = [f for f in TOLERANCES if f != self.scale.release]
+        self.changes = np.stack([self._change(name) for name in names], 1)
+        gram = self.changes.T @ self.changes + np.eye(len(names))
         self.solve = np.linalg.inv(gram)
 
     def _seen(self, mechanism: Mechanism) -> np.ndarray:
@@ -165,10 +165,10 @@ class _Finder:
         scaled = [x / s for x, s in zip(parts, self.sigma, strict=True)]
         return np.concatenate([x.ravel() for x in scaled])
 
-    def _bend(self, figure: str) -> np.ndarray:
-        """How the record changes when a believed figure moves by its tolerance."""
-        by = TOLERANCES[figure]
-        moved = changed(self.base, self.joint, figure, by)
+    def _change(self, name: str) -> np.ndarray:
+        """How the record changes when a nominal parameter moves by its tolerance."""
+        by = TOLERANCES[name]
+        moved = changed(self.base, self.joint, name, by)
         return self._seen(moved) - self.plain
 
     def hidden(self, mechanism: Mechanism, size: float) -> Mechanism:
@@ -181,7 +181,7 @@ class _Finder:
         moved = self._seen(self.hidden(self.base, size)) - self.plain
         if not np.all(np.isfinite(moved)):
             return math.inf
-        rest = moved - self.bends @ (self.solve @ (self.bends.T @ moved))
+        rest = moved - self.changes @ (self.solve @ (self.changes.T @ moved))
         return math.sqrt(1.0 + float(rest @ rest) / rest.size)
 
     def size(self, target: float) -> tuple[float, float]:

@@ -65,7 +65,7 @@ class JointDrive:
         return self.targets[self.order[max(last, 0)]]
 
     def encoder(self, q: float) -> float:
-        """What the encoder tells of an angle [rad]."""
+        """What the encoder reads at an angle [rad]."""
         if self.sine or self.cosine:
             q = q + self.sine * math.sin(q) + self.cosine * math.cos(q)
         return self.scale * q + self.offset

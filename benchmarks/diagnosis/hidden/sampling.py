@@ -17,8 +17,8 @@ class Noise:
     Attributes:
         angle_lsb_rad, angle_sd_rad: step of the encoder and white noise.
         torque_lsb_nm, torque_sd_nm: the same of the effort.
-        jitter_s: deviation of the host's ticks, which the log tells.
-        stamp_s: deviation of a time stamp from when the reading was taken, untold.
+        jitter_s: deviation of the host's ticks, which are in the log.
+        stamp_s: deviation of a time stamp from when the reading was taken; not logged.
         lost: share of readings that are missing in their rows.
         stalls: pauses of the host, 30 to 60 ms without rows.
         start_rad: deviation of the angle at the beginning from the first target.

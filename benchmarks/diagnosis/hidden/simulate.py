@@ -17,7 +17,7 @@ class Motion:
     Attributes:
         t_s: times [s].
         angle, speed: of the links [rad], [rad/s].
-        encoder: what the encoders tell [rad].
+        encoder: readings of the encoders [rad].
         torque: of the motors [N·m].
     """
 

@@ -18,7 +18,7 @@ class Scale:
     Attributes:
         apply: (mechanism, joint, size, generator of shapes) -> with the effect.
         low, high: sizes to search.
-        release: believed figure that the effect is a change of, "" if none.
+        release: nominal parameter that the effect is a change of, "" if none.
         least: smallest size that is more than a tolerance: four of them.
         kinds: stands that can show it.
     """
@@ -62,11 +62,11 @@ def _cutoff(mechanism, joint, size, rng):
     return mechanism.with_effect(joint, "lowpass_cutoff", cutoff_hz=value)
 
 
-def _below(name: str, parameter: str, figure: str, top: float) -> Apply:
-    """A limit: the figure's believed value, or `top` at most, over 1 + size."""
+def _below(name: str, parameter: str, nominal: str, top: float) -> Apply:
+    """A limit: its nominal value, or `top` at most, over 1 + size."""
 
     def apply(mechanism, joint, size, rng):
-        value = min(getattr(mechanism.joints[joint], figure), top) / size
+        value = min(getattr(mechanism.joints[joint], nominal), top) / size
         return mechanism.with_effect(joint, name, **{parameter: value})
 
     return apply

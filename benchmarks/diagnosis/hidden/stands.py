@@ -25,7 +25,7 @@ TOLERANCES = {
     "slew_rad_s": 0.05,
     "offset_rad": 1e-3,
 }
-"""How wrong the believed figures may be: relative, the encoder's zero in radian."""
+"""How wrong nominal parameters may be: relative, the encoder's zero in radian."""
 
 
 @dataclass(frozen=True)
@@ -94,34 +94,34 @@ def _finger(finger: int, rng: np.random.Generator, lowpass_hz: float):
     hand, names = load_hand_file(), figures().joint_names
     links, joints, middle, reach = [], [], [], []
     for i in range(4 * finger, 4 * finger + 4):
-        figure = figures().links[i]
+        link = figures().links[i]
         parent = "world" if i == 4 * finger else names[i - 1]
         links.append(
             Link(
-                name=figure.joint,
-                pos=figure.pos,
-                quat=figure.quat,
+                name=link.joint,
+                pos=link.pos,
+                quat=link.quat,
                 axis=(0.0, 1.0, 0.0),
-                mass=figure.mass,
-                com=figure.inertial_pos,
-                inertia_quat=figure.inertial_quat,
-                inertia=figure.diaginertia,
-                range_rad=figure.range_rad,
+                mass=link.mass,
+                com=link.inertial_pos,
+                inertia_quat=link.inertial_quat,
+                inertia=link.diaginertia,
+                range_rad=link.range_rad,
                 parent=parent,
             )
         )
         joints.append(
             Joint(
-                kp=figure.kp * hand.stiffness_scale.per_joint()[i],
-                kd=figure.kv * hand.damping_scale.per_joint()[i],
-                armature=figure.armature,
+                kp=link.kp * hand.stiffness_scale.per_joint()[i],
+                kd=link.kv * hand.damping_scale.per_joint()[i],
+                armature=link.armature,
                 delay_s=hand.delay_s.value,
                 lowpass_hz=lowpass_hz,
                 slew_rad_s=float(hand.speed_limit.per_joint()[i]),
-                limit_nm=figure.force_limit * hand.torque_scale.per_joint()[i],
+                limit_nm=link.force_limit * hand.torque_scale.per_joint()[i],
             )
         )
-        low, high = figure.range_rad
+        low, high = link.range_rad
         middle.append(0.5 * (low + high))
         reach.append(min(0.5, 0.4 * (high - low)))
     quat = rng.normal(size=4)
@@ -141,25 +141,25 @@ def _hand(rng: np.random.Generator, lowpass_hz: float) -> Stand:
     return Stand("hand", whole, tuple(range(20)), middle, reach)
 
 
-def changed(mechanism: Mechanism, joint: int, figure: str, by: float) -> Mechanism:
+def changed(mechanism: Mechanism, joint: int, name: str, by: float) -> Mechanism:
     """Returns a mechanism with one parameter of a joint off by a share.
 
     The encoder's zero is off by an angle instead.
     """
-    if figure == "mass":
+    if name == "mass":
         masses = list(mechanism.payload_kg or (0.0,) * len(mechanism.links))
         masses[joint] += by * mechanism.links[joint].mass
         return replace(mechanism, payload_kg=tuple(masses))
     old = mechanism.joints[joint]
-    value = getattr(old, figure)
-    new = value + by if figure == "offset_rad" else value * (1.0 + by)
-    return mechanism.with_joint(joint, replace(old, **{figure: new}))
+    value = getattr(old, name)
+    new = value + by if name == "offset_rad" else value * (1.0 + by)
+    return mechanism.with_joint(joint, replace(old, **{name: new}))
 
 
 def slightly_wrong(mechanism: Mechanism, rng: np.random.Generator) -> Mechanism:
     """Returns what a mechanism may be while it is believed to be this one."""
     for joint in range(len(mechanism.joints)):
-        for figure, tolerance in TOLERANCES.items():
+        for name, tolerance in TOLERANCES.items():
             by = tolerance * rng.uniform(-1.0, 1.0)
-            mechanism = changed(mechanism, joint, figure, by)
+            mechanism = changed(mechanism, joint, name, by)
     return mechanism

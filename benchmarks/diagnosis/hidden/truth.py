@@ -1,4 +1,4 @@
-"""What is really going on in a hidden mechanism: figures of its joints and effects.
+"""What is really going on in a hidden mechanism: parameters of its joints and effects.
 
 The hidden simulator knows nothing of the product's effects. Names of fields follow the
 catalogue's identifiers so that a verdict can be compared with the truth; every equation
@@ -21,7 +21,7 @@ class Joint:
         kp, kd: gains [N·m/rad], [N·m·s/rad].
         armature: inertia of rotor and gears at the joint [kg·m²].
         delay_s, lowpass_hz, slew_rad_s, limit_nm: command path and torque limit.
-        offset_rad: error of the encoder's zero that calibration left.
+        offset_rad: error of the encoder's zero that calibration did not remove.
         effects: parameters of hidden effects.
     """
 

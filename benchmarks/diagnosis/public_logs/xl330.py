@@ -72,7 +72,7 @@ def _load(path: Path) -> MeasuredLog:
 
 
 def _numbers(entries: list[dict[str, Any]], name: str) -> np.ndarray:
-    """Returns one figure of all entries."""
+    """Returns one field of all entries."""
     return np.asarray([float(entry[name]) for entry in entries])
 
 

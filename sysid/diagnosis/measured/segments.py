@@ -178,7 +178,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         t_s, values = t_s[inside], values[inside]
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
-            speed = drive.figure("slew_limit", "speed_rad_s", np.inf)
+            speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
             valid &= ~_unsaid(t_s, values, fine, 1.6 * period, speed)
             valid &= ~_untold(log, name, names["pos"], fine)
         else:

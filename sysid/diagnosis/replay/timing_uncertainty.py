@@ -48,11 +48,11 @@ def timing_doubt(
         drive: the simulation as it stands.
         dt: step of the grid [s].
     """
-    cutoff = drive.figure("lowpass_cutoff", "cutoff_hz", np.inf)
-    speed = drive.figure("slew_limit", "speed_rad_s", np.inf)
+    cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
+    speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
     omega = min(2.0 * np.pi * cutoff, 0.5 / dt)
     change = np.diff(cmd, axis=0, prepend=cmd[:1]) ** 2
-    lag = round(drive.figure("transport_delay", "delay_s", 0.0) / dt)
+    lag = round(drive.parameter("transport_delay", "delay_s", 0.0) / dt)
     change = np.concatenate([np.zeros((lag, cmd.shape[1])), change])[: len(cmd)]
     total, rate = np.zeros(cmd.shape[1]), np.zeros_like(cmd)
     for k, added in enumerate(change):

@@ -241,7 +241,7 @@ def _between(drive: JointDrive, every: int) -> bool:
     Without a low-pass it jumps, and nobody knows whether a reading comes before a jump
     or after it.
     """
-    cutoff = drive.figure("lowpass_cutoff", "cutoff_hz", np.inf)
+    cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
     return every == 1 and drive.known == "both" and bool(np.isfinite(cutoff))
 
 

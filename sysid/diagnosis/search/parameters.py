@@ -21,7 +21,7 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import Parameter
 from sysid.diagnosis.replay.residuals import joint_effects
 from sysid.diagnosis.replay.track import JointTrack
-from sysid.mechanism import Figure, JointDrive
+from sysid.mechanism import JointDrive, Nominal
 
 SIGMA = 3.0**-0.5
 """Deviation of a figure that may be anywhere within its tolerance, in tolerances."""
@@ -215,7 +215,7 @@ def _pseudo(name: str, unit: str, kind: Kind, scale: float, tight: float) -> Slo
     return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, sigma, (), False)
 
 
-def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Figure]:
+def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Nominal]:
     """Returns what the simulation has of an effect."""
     if effect == "stiffness":
         return {"scale": replace(drive.kp, value=1.0)}
@@ -226,11 +226,11 @@ def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Fig
         # Masses scale all of it; drive and links may be wrong in opposite ways.
         known = math.sqrt(2.0) * track.armature
         inertia = known or float(np.mean(np.asarray(track.track.inertia)))
-        return {"inertia_kgm2": Figure(0.0, MASS * inertia)}
+        return {"inertia_kgm2": Nominal(0.0, MASS * inertia)}
     if effect == "payload_mass" and not found:
-        return {"mass_kg": Figure(0.0, MASS * float(np.mean(track.track.payload_kg)))}
+        return {"mass_kg": Nominal(0.0, MASS * float(np.mean(track.track.payload_kg)))}
     if effect == "encoder_offset" and not found and not track.slide:
-        return {"offset_rad": Figure(0.0, ZERO_RAD)}
+        return {"offset_rad": Nominal(0.0, ZERO_RAD)}
     return found
 
 
@@ -271,7 +271,7 @@ def _slot(
     effect: str,
     name: str,
     parameter: Parameter,
-    figure: Figure | None,
+    figure: Nominal | None,
     sizes: dict[str, float],
     slide: bool,
 ) -> Slot:
@@ -322,7 +322,7 @@ def _bounded(slot: Slot, parameter: Parameter) -> Slot:
     return replace(slot, low=max(slot.low, ends[0]), high=min(slot.high, ends[1]))
 
 
-def _known(slot: Slot, figure: Figure) -> Slot:
+def _known(slot: Slot, figure: Nominal) -> Slot:
     """Places a coordinate at the figure that the simulation has."""
     absent = figure.value == 0.0 and slot.kind == "linear"
     base = slot.coordinate(figure.value)

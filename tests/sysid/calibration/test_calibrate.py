@@ -13,8 +13,8 @@ from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from sysid.calibration.calibrate import calibrate, calibrated_hand, weighed_mean
-from sysid.calibration.figures import write_figures
 from sysid.calibration.friction import pull_of
+from sysid.calibration.plots import write_plots
 from sysid.logs.log import make_log
 from sysid.mechanism import hand_mechanism
 
@@ -89,7 +89,7 @@ def test_the_hand_file_has_it_with_its_provenance(found, hidden, tmp_path):
 
 
 def test_pictures_and_figures_are_written(found, tmp_path):
-    paths = write_figures(found, tmp_path)
+    paths = write_plots(found, tmp_path)
     assert {path.stem for path in paths} == {*found.joints, "pulls", "table1"}
     assert all(path.stat().st_size > 5000 for path in paths)
     data = json.loads(found.to_json())

@@ -9,7 +9,7 @@ from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
 from sysid.logs.log import make_log
 from sysid.logs.read import write_log
-from sysid.mechanism import Figure, JointDrive, model_mechanism
+from sysid.mechanism import JointDrive, Nominal, model_mechanism
 
 ARM = """
 <mujoco><compiler angle="radian"/><worldbody>
@@ -27,7 +27,7 @@ T = np.arange(800) * 0.005
 
 def arm():
     model = mujoco.MjModel.from_xml_string(ARM)
-    drive = JointDrive(Figure(5.0), Figure(0.1), effort="none")
+    drive = JointDrive(Nominal(5.0), Nominal(0.1), effort="none")
     return model_mechanism(model, {"*": drive})
 
 

@@ -23,7 +23,7 @@ from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
 from sysid.logs.log import MeasuredLog, make_log
 from sysid.logs.read import write_log
-from sysid.mechanism import Figure
+from sysid.mechanism import Nominal
 
 SEED = random.SystemRandom().randrange(10**6)
 ROUND_S = 6.0
@@ -101,7 +101,7 @@ def test_another_unit_of_the_effort_changes_nothing(lopsided):
         {"cmd": "rad", "pos": "rad", "cur": "A"},
     )
     drive = mechanism.drives["servo"]
-    scale = Figure(0.5, drive.effort_scale.tolerance)
+    scale = Nominal(0.5, drive.effort_scale.tolerance)
     other = dataclasses.replace(drive, effort="cur", effort_scale=scale)
     second = diagnose(
         [amperes], dataclasses.replace(mechanism, drives={"servo": other})

@@ -21,19 +21,19 @@ from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.parameters import make_space
 from sysid.diagnosis.search.search import settled
 from sysid.logs.log import make_log
-from sysid.mechanism import Figure, JointDrive, hand_mechanism, model_mechanism
+from sysid.mechanism import JointDrive, Nominal, hand_mechanism, model_mechanism
 
 STAND = """
 <mujoco><worldbody><body><joint name="knee" axis="0 1 0"/>
 <inertial pos="0 0 -0.1" mass="0.2" diaginertia="1e-4 1e-4 1e-4"/>
 </body></worldbody></mujoco>"""
 
-DRIVE = JointDrive(Figure(5.0), Figure(0.1, 0.1))
+DRIVE = JointDrive(Nominal(5.0), Nominal(0.1, 0.1))
 
 
 def stand(**drive):
     model = mujoco.MjModel.from_xml_string(STAND)
-    fields = {"kp": Figure(5.0), "kd": Figure(0.1, 0.1), **drive}
+    fields = {"kp": Nominal(5.0), "kd": Nominal(0.1, 0.1), **drive}
     return model_mechanism(model, {"knee": JointDrive(**fields)})
 
 
@@ -105,7 +105,7 @@ def test_a_target_that_nobody_saw_acts_until_it_is_reached():
     """Rows are missing in which the target jumps by 1 rad, at 2 rad/s at most."""
     t_s = np.delete(np.arange(0.0, 6.0, 0.005), slice(400, 410))
     log = log_of(t_s, np.where(t_s < 2.02, 0.0, 1.0), np.sin(t_s))
-    slow = replace(DRIVE, effects={"slew_limit": {"speed_rad_s": Figure(2.0)}})
+    slow = replace(DRIVE, effects={"slew_limit": {"speed_rad_s": Nominal(2.0)}})
     for drive, until_s in ((DRIVE, 2.3), (slow, 2.8)):
         valid = pieces_of(log, 0, {"knee": drive}, 0.005)[0].valid[:, 0]
         assert not valid[402 : int(until_s / 0.005) - 1].any()
@@ -160,7 +160,7 @@ def test_coordinates_and_identity():
     """At the base every effect of the stand vanishes, and values come back."""
     t_s = np.arange(0.0, 4.0, 0.005)
     q = 0.5 * np.sin(t_s)
-    mechanism = stand(effects={"slew_limit": {"speed_rad_s": Figure(3.0)}})
+    mechanism = stand(effects={"slew_limit": {"speed_rad_s": Nominal(3.0)}})
     track = all_tracks([log_of(t_s, q, q)], mechanism)[0]
     space = make_space(track, mechanism.drives["knee"], {"others_nm": True})
     params, _ = space.values(space.base[None])

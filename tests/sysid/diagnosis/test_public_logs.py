@@ -15,7 +15,7 @@ from benchmarks.diagnosis.public_logs.sts3215 import RAD_PER_COUNT, load_sts3215
 from benchmarks.diagnosis.public_logs.xl330 import load_xl330
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import examine
-from sysid.mechanism import Figure, JointDrive, model_mechanism
+from sysid.mechanism import JointDrive, Nominal, model_mechanism
 
 REAL = os.environ.get("FINGERS_REAL_DATA", "")
 real = pytest.mark.skipif(not REAL, reason="FINGERS_REAL_DATA names no folder")
@@ -30,12 +30,12 @@ AXIS = """
 def axis():
     """The published reference model: its offset may be chosen freely."""
     drive = JointDrive(
-        Figure(160.18 * 243.45),
-        Figure(243.45),
+        Nominal(160.18 * 243.45),
+        Nominal(243.45),
         effects={
-            "viscous_friction": {"damping_nms": Figure(203.5, 0.1)},
-            "coulomb_friction": {"torque_nm": Figure(20.39, 0.1)},
-            "asymmetric_friction": {"difference_nm": Figure(-6.3, free=True)},
+            "viscous_friction": {"damping_nms": Nominal(203.5, 0.1)},
+            "coulomb_friction": {"torque_nm": Nominal(20.39, 0.1)},
+            "asymmetric_friction": {"difference_nm": Nominal(-6.3, free=True)},
         },
         known="mechanics",
     )
@@ -91,11 +91,11 @@ MANUAL = 4096 / (2.0 * np.pi * 885 * 128)
 def servo(known, share, tolerance, effects):
     """The XL330; `share` of the manual's gain."""
     drive = JointDrive(
-        Figure(STALL_NM * MANUAL * share),
-        Figure(1e-6, 10.0),
+        Nominal(STALL_NM * MANUAL * share),
+        Nominal(1e-6, 10.0),
         kp_setting="kp",
         effort="duty",
-        effort_scale=Figure(STALL_NM, tolerance, free=known != "controller"),
+        effort_scale=Nominal(STALL_NM, tolerance, free=known != "controller"),
         effects=effects,
         known=known,
     )
@@ -105,7 +105,7 @@ def servo(known, share, tolerance, effects):
 @real
 @pytest.mark.slow
 def test_xl330_gain_is_half_of_the_manual():
-    full = {"torque_limit": {"limit_nm": Figure(STALL_NM, 0.01)}}
+    full = {"torque_limit": {"limit_nm": Nominal(STALL_NM, 0.01)}}
     logs = load_xl330(Path(REAL) / "bam_xl330" / "raw")
     said, _ = examine(logs, servo("controller", 1.0, 0.002, full))
     assert said.causes[0].effect == "stiffness"
@@ -120,9 +120,9 @@ def test_xl330_gain_is_half_of_the_manual():
 def test_xl330_load_friction_and_limit():
     """Every gain is predicted from the others: 102 to 48 mrad in closed loop."""
     free = {
-        "viscous_friction": {"damping_nms": Figure(0.02, 0.1, free=True)},
-        "coulomb_friction": {"torque_nm": Figure(0.01, 0.1, free=True)},
-        "armature": {"inertia_kgm2": Figure(0.0, 0.1, free=True)},
+        "viscous_friction": {"damping_nms": Nominal(0.02, 0.1, free=True)},
+        "coulomb_friction": {"torque_nm": Nominal(0.01, 0.1, free=True)},
+        "armature": {"inertia_kgm2": Nominal(0.0, 0.1, free=True)},
     }
     logs = load_xl330(Path(REAL) / "bam_xl330" / "raw")
     said, _ = examine(logs, servo("both", 0.5, 0.05, free))
@@ -139,16 +139,16 @@ ARM = """
 <inertial pos="0 0 0" mass="0.1" diaginertia="1e-3 1e-3 1e-3"/>
 </body></worldbody></mujoco>"""
 SLOW_PATH = {
-    "slew_limit": {"speed_rad_s": Figure(400 * RAD_PER_COUNT, 0.3, free=True)},
-    "transport_delay": {"delay_s": Figure(0.1, 0.1, free=True)},
+    "slew_limit": {"speed_rad_s": Nominal(400 * RAD_PER_COUNT, 0.3, free=True)},
+    "transport_delay": {"delay_s": Nominal(0.1, 0.1, free=True)},
 }
 
 
 def sts3215(known_to):
     """The servo as it answers in rest: 8 thousandths of its duty for a count."""
     drive = JointDrive(
-        Figure(0.008 / RAD_PER_COUNT, known_to),
-        Figure(1e-6, 10.0),
+        Nominal(0.008 / RAD_PER_COUNT, known_to),
+        Nominal(1e-6, 10.0),
         effort="duty",
         effects=SLOW_PATH,
         known="controller",

@@ -6,7 +6,7 @@ import pytest
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose
 from sysid.logs.log import make_log
-from sysid.mechanism import Figure, JointDrive, model_mechanism
+from sysid.mechanism import JointDrive, Nominal, model_mechanism
 
 SEED = int.from_bytes(np.random.default_rng().bytes(3))
 ARM = """
@@ -37,7 +37,7 @@ def pulled(half_width_rad):
 
 
 def held():
-    drive = JointDrive(Figure(KP, 0.05), Figure(1e-6, 10.0), known="controller")
+    drive = JointDrive(Nominal(KP, 0.05), Nominal(1e-6, 10.0), known="controller")
     model = mujoco.MjModel.from_xml_string(ARM)
     return model_mechanism(model, {"servo": drive})
 
@@ -59,7 +59,7 @@ def test_without_it_nothing_is_found():
 def test_without_the_effort_nothing_can_be_said():
     log = pulled(0.004)
     columns = {k: v for k, v in log.columns.items() if not k.startswith("tau")}
-    drive = JointDrive(Figure(KP, 0.05), Figure(0.1, 0.1), effort="none")
+    drive = JointDrive(Nominal(KP, 0.05), Nominal(0.1, 0.1), effort="none")
     model = mujoco.MjModel.from_xml_string(ARM)
     mechanism = model_mechanism(model, {"servo": drive})
     said = diagnose([make_log(("servo",), log.t_s, columns)], mechanism)

@@ -11,8 +11,8 @@ from sysid.excitation.plan import Limits, Schedule, make_plan
 from sysid.excitation.separation import separation
 from sysid.excitation.waves import WAVES, multisine_lines
 from sysid.mechanism import (
-    Figure,
     JointDrive,
+    Nominal,
     hand_mechanism,
     joint_groups,
     model_mechanism,
@@ -34,9 +34,9 @@ TWO_ARMS = """
 def arms(apart=1.0, limit=1.0):
     """Two parallel arms of 10 cm."""
     model = mujoco.MjModel.from_xml_string(TWO_ARMS.format(apart=apart))
-    effects = {"torque_limit": {"limit_nm": Figure(limit)}}
+    effects = {"torque_limit": {"limit_nm": Nominal(limit)}}
     return model_mechanism(
-        model, {"*": JointDrive(Figure(4.0), Figure(0.1), effects=effects)}
+        model, {"*": JointDrive(Nominal(4.0), Nominal(0.1), effects=effects)}
     )
 
 

@@ -11,8 +11,8 @@ _MEASURED, _SIMULATED = "#0072B2", "#D55E00"
 _PANELS = ("angle [rad]", "effort [N·m]")
 
 
-def write_figures(found: Calibration, folder: Path) -> list[Path]:
-    """Draws one picture per joint, one of all pulls and one of all figures.
+def write_plots(found: Calibration, folder: Path) -> list[Path]:
+    """Draws one picture per joint, one of all pulls and one of all parameters.
 
     Raises:
         ModuleNotFoundError: matplotlib, of the optional dependencies `viz`, is missing.
@@ -80,7 +80,7 @@ def _pulls(found: Calibration, path: Path) -> Path:
 
 
 def _table(found: Calibration, path: Path) -> Path:
-    """All figures as points with their intervals."""
+    """All parameters as points with their intervals."""
     from matplotlib.figure import Figure
 
     rows = [(name, e.value, e.low, e.high, e.unit) for name, e in found.shared.items()]
@@ -92,7 +92,7 @@ def _table(found: Calibration, path: Path) -> Path:
     figure = Figure((8.0, 0.32 * len(rows) + 1.0), layout="constrained")
     axes = figure.subplots()
     for y, (_, value, low, high, _) in enumerate(rows):
-        # Relative, for the figures have different units.
+        # Relative, for the parameters have different units.
         bounds = (low / value - 1.0, high / value - 1.0)
         if np.all(np.isfinite(bounds)):
             axes.plot(np.multiply(100.0, bounds), [y, y], color=_MEASURED, lw=2)
