@@ -9,8 +9,8 @@ make when they move by their tolerances,
 
 half of which is the log-likelihood gain [nat] that the effect is there, and that it is
 a and not b at any size c. It grows with the square of the size, which gives the
-smallest size that shows, and what could stand for an effect that is barely clear. Nothing is
-looked up: another plan, load or gain gives other numbers.
+smallest size that shows, and what could stand for an effect that is barely clear.
+Nothing is looked up: another plan, load or gain gives other numbers.
 """
 
 from collections.abc import Mapping
