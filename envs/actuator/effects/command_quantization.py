@@ -7,8 +7,8 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 
 def quantized(
-    command: Float[Array, "*j"], step_rad: Float[ArrayLike, "*#j"]
-) -> Float[Array, "*j"]:
+    command: Float[Array, "..."], step_rad: Float[ArrayLike, "..."]
+) -> Float[Array, "..."]:
     """Rounds to the nearest step: c = Δ round(u / Δ) [rad]; c = u for Δ = 0.
 
     Args:

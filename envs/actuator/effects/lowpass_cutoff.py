@@ -7,11 +7,11 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 
 def filtered(
-    last: Float[Array, "*j"],
-    command: Float[Array, "*j"],
-    cutoff_hz: Float[ArrayLike, "*#j"],
-    dt: float | Float[Array, "*j"],
-) -> Float[Array, "*j"]:
+    last: Float[Array, "..."],
+    command: Float[Array, "..."],
+    cutoff_hz: Float[ArrayLike, "..."],
+    dt: float | Float[Array, "..."],
+) -> Float[Array, "..."]:
     """Advances the low-pass, exactly for a command that is held over the substep.
 
     y' = y + (1 − e^{−2π f_c Δt}) (u − y) [rad]. Its time constant 1/(2πf_c) does not
