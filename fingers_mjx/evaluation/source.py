@@ -47,12 +47,10 @@ def nominal(setup: Setup) -> Setup:
     A keyboard has its nominal parameters, and lies where it should.
     """
     calm = no_randomization(setup.hand.tip_friction.value)
-    noise = ("reset_joint_rad", "reset_speed_mps")  # of tasks that start in the stance
-    still: dict[str, Any] = {n: 0.0 for n in noise if hasattr(setup.env, n)}
+    still: dict[str, Any] = {"reset_joint_rad": 0.0, "reset_speed_mps": 0.0}
     if isinstance(setup.env, KeyboardConfig):
         still["keyboard"] = nominal_keyboard()
-    env = dataclasses.replace(setup.env, randomize=calm, **still)
-    return dataclasses.replace(setup, env=env)
+    return _with_fields(setup, randomize=calm, **still)
 
 
 def as_deployed(setup: Setup) -> Setup:
@@ -60,9 +58,7 @@ def as_deployed(setup: Setup) -> Setup:
 
     Of a recovery it is the end: detector and ramp (`envs.tasks.recovery.settle`).
     """
-    if not hasattr(setup.env, "settle"):
-        return setup
-    return dataclasses.replace(setup, env=dataclasses.replace(setup.env, settle=True))
+    return _with_fields(setup, settle=True)
 
 
 def without_practice(setup: Setup) -> Setup:
@@ -70,10 +66,7 @@ def without_practice(setup: Setup) -> Setup:
 
     Only training starts from practice poses (`envs.tasks.recovery.practice`).
     """
-    if not hasattr(setup.env, "practice_fraction"):
-        return setup
-    env = dataclasses.replace(setup.env, practice_fraction=0.0)
-    return dataclasses.replace(setup, env=env)
+    return _with_fields(setup, practice_fraction=0.0)
 
 
 def with_command(setup: Setup, command: Sequence[float]) -> Setup:
@@ -93,8 +86,13 @@ def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
     fixed = dict(zip(fields, ranges, strict=True))
     changed = dataclasses.replace(setup.env.command, **fixed, standing_fraction=0.0)
-    env = dataclasses.replace(setup.env, command=changed)
-    return dataclasses.replace(setup, env=env)
+    return _with_fields(setup, command=changed)
+
+
+def _with_fields(setup: Setup, **changes: Any) -> Setup:
+    """Returns `setup` with those of the changes whose fields its task has."""
+    known = {k: v for k, v in changes.items() if hasattr(setup.env, k)}
+    return dataclasses.replace(setup, env=dataclasses.replace(setup.env, **known))
 
 
 def evaluate_source(
@@ -121,9 +119,7 @@ def evaluate_source(
     """
     setup = source.setup
     if steps is not None:
-        length_s = steps * setup.env.control_dt_s
-        env = dataclasses.replace(setup.env, episode_s=length_s)
-        setup = dataclasses.replace(setup, env=env)
+        setup = _with_fields(setup, episode_s=steps * setup.env.control_dt_s)
     # What a fallen hand does does not count, so there is no need to set it up again.
     batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
     table = evaluate(

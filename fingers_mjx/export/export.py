@@ -23,7 +23,9 @@ PARITY_ROWS = 8
 
 
 class ExportError(ValueError):
-    """The exported graph is not the trained network."""
+    """The exported graph is not the trained network (status 2)."""
+
+    exit_code = 2
 
 
 @dataclass(frozen=True)

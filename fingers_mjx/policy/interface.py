@@ -78,35 +78,25 @@ def check_run_interface(run_dir: Path, env: BatchEnv) -> None:
         InputError: naming the first field that differs.
     """
     saved = saved_bound(run_dir).get("identity", {}).get(INTERFACE, {})
-    check_same(run_dir / RUN_FILE, saved, dataclasses.asdict(interface_of(env)))
+    check_interface(run_dir / RUN_FILE, saved, interface_of(env))
 
 
-def check_interface(source: object, found: Interface, ours: Interface) -> None:
+def check_interface(
+    source: object, found: Interface | Mapping[str, Any], ours: Interface
+) -> None:
     """Refuses a policy whose interface is not that of the environment.
 
     Args:
         source: file of the policy, for the message.
-        found: interface of the policy.
+        found: interface of the policy, or the fields that a run has saved of it.
         ours: interface of the environment.
 
     Raises:
         InputError: naming the first field that differs.
     """
-    check_same(source, dataclasses.asdict(found), dataclasses.asdict(ours))
-
-
-def check_same(source: object, found: Mapping[str, Any], ours: Any) -> None:
-    """Refuses plain data of an interface that is not that of the environment.
-
-    Args:
-        source: file of the policy, for the message.
-        found: what the policy has; what it does not mention is not compared.
-        ours: what the environment has.
-
-    Raises:
-        InputError: naming the first field that differs.
-    """
-    wanted = dict(_leaves(_one_speed(ours, found), "interface"))
+    if isinstance(found, Interface):
+        found = dataclasses.asdict(found)
+    wanted = dict(_leaves(_one_speed(dataclasses.asdict(ours), found), "interface"))
     for field, value in _leaves(dict(found), "interface"):
         if not _same(value, wanted.get(field, "nothing")):
             valid = f"{wanted.get(field, 'nothing')}, as the environment has"

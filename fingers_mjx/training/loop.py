@@ -155,7 +155,7 @@ class Loop:
     def _report_overflow(self, metrics: Mapping[str, float], when: str) -> None:
         """Stops the run where contacts were dropped, or notes it and goes on."""
         worlds, settings = self.config.num_envs, self.services.env_config
-        for error in overflows(metrics, when, worlds, settings):
+        for error in _overflows(metrics, when, worlds, settings):
             if self.config.on_overflow == "stop":
                 raise error
             self.services.note(str(error))
@@ -216,7 +216,7 @@ class Loop:
         return self.saved
 
 
-def overflows(
+def _overflows(
     metrics: Mapping[str, float], when: str, num_envs: int, config: Any
 ) -> Iterator[InputError]:
     """Yields an error for each buffer that was too small.
