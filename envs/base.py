@@ -1,7 +1,7 @@
 """The environment contract: what `reset` and `step` return."""
 
 from collections.abc import Mapping
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol
 
 import flax.struct
 from jaxtyping import Array, Float, PRNGKeyArray
@@ -33,7 +33,6 @@ class State:
     memory: Any
 
 
-@runtime_checkable
 class VectorEnv(Protocol):
     """Worlds in step, each reset by itself: what learning and evaluation need."""
 
