@@ -1,9 +1,11 @@
 """Fits side by side, against closed forms."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
-from sysid.least_squares import Task, fit_all
+from sysid.least_squares import Task, fit_all, gauss_newton, standard_errors
 
 RNG = np.random.default_rng(3)
 A, Y = RNG.normal(size=(40, 3)), RNG.normal(size=40)
@@ -53,3 +55,56 @@ def test_curved():
     tasks = [task(s, free=(0, 1)) for s in ([1.0, 0.5, 0.0], [3.0, 3.0, 0.0])]
     for fit in fit_all(residual, tasks, rounds=20):
         assert fit.theta[:2] == pytest.approx([2.0, 1.5], abs=1e-2)
+
+
+def test_central_differences_are_exact_for_a_parabola():
+    """Forward differences of t² at 0 with step h are h; central ones are 0."""
+
+    def residual(thetas):
+        return thetas[:, :1] ** 2 + 0.0 * A[:, 0]
+
+    plain = task([0, 0, 0], free=(0,))
+    both = [plain, dataclasses.replace(plain, central=True)]
+    forward, central = fit_all(residual, both, rounds=0)
+    assert forward.jacobian[0, 0] == pytest.approx(1e-2)
+    assert central.jacobian[0, 0] == 0.0
+
+
+def test_a_full_step_solves_a_linear_problem():
+    prior = np.full(3, 1e6)
+    step = gauss_newton(A, -Y, np.zeros(3), prior)
+    assert step == pytest.approx(np.linalg.lstsq(A, Y, rcond=None)[0], abs=1e-6)
+    assert np.all(np.abs(gauss_newton(A, -Y, np.zeros(3), prior, 1e9)) < 1e-6)
+
+
+def test_blocks_of_one_residual_give_the_usual_errors_of_white_noise():
+    rng = np.random.default_rng(8)
+    j = rng.normal(size=(4000, 3))
+    noise = rng.normal(size=4000)
+    plain = fit_all(lambda thetas: thetas @ j.T - noise, [task([0, 0, 0])])[0]
+    usual = np.sqrt(np.diag(np.linalg.inv(j.T @ j)))
+    errors, wide = standard_errors(plain, np.full(3, 1e6), np.arange(4000))
+    assert errors == pytest.approx(usual, rel=0.1)
+    assert wide == pytest.approx(1.96, abs=0.01)
+
+
+def test_repeated_residuals_do_not_count_twice():
+    """Each of 400 residuals stands there nine times; a block holds the nine."""
+    rng = np.random.default_rng(9)
+    j, noise = rng.normal(size=(400, 3)), rng.normal(size=400)
+    single = fit_all(lambda x: x @ j.T - noise, [task([0, 0, 0])])[0]
+    often = np.repeat(j, 9, 0), np.repeat(noise, 9)
+    nine = fit_all(lambda x: x @ often[0].T - often[1], [task([0, 0, 0])])[0]
+    prior = np.full(3, 1e6)
+    alone, _ = standard_errors(single, prior, np.arange(400))
+    blocks, _ = standard_errors(nine, prior, np.repeat(np.arange(400), 9))
+    assert blocks == pytest.approx(alone, rel=1e-3)
+
+
+def test_what_the_data_do_not_show_has_no_error():
+    def residual(thetas):
+        return thetas @ (A * [1.0, 1.0, 1e-3]).T - Y
+
+    fit = fit_all(residual, [task([0, 0, 0], deviation=2.0)])[0]
+    errors, _ = standard_errors(fit, np.full(3, 2.0), np.arange(40))
+    assert np.isnan(errors).tolist() == [False, False, True]

@@ -30,7 +30,7 @@ def middle(effect):
 
 @pytest.mark.parametrize("effect", joint_effects())
 def test_written_and_read(effect, tmp_path):
-    found = diagnosis(effect, **middle(effect))
+    found = diagnosis(effect, "finger2_joint3", **middle(effect))
     hand = extended_hand(HAND, found)
     assert hand != HAND
     save_hand_file(hand, tmp_path / "hand.yaml")

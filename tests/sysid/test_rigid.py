@@ -1,0 +1,54 @@
+"""Rigid bodies along a motion, against closed forms of a pendulum."""
+
+import numpy as np
+import pytest
+
+from envs.physics.quiet_mujoco import mujoco
+from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.rigid import JointMotion, at_rest, bodies_along, interpolated, mount_gravity
+
+MASS, LENGTH, ARMATURE, G = 0.3, 0.1, 1e-3, 9.81
+PENDULUM = f"""
+<mujoco><compiler angle="radian"/><worldbody><body>
+  <joint name="a" axis="0 1 0" armature="{ARMATURE}"/>
+  <inertial pos="0 0 {-LENGTH}" mass="{MASS}" diaginertia="1e-9 1e-9 1e-9"/>
+</body></worldbody></mujoco>
+"""
+UPRIGHT = (1.0, 0.0, 0.0, 0.0)
+
+
+def pendulum():
+    model = mujoco.MjModel.from_xml_string(PENDULUM)
+    return model_mechanism(model, {"a": JointDrive(Nominal(1.0), Nominal(0.1))})
+
+
+def test_a_pendulum_weighs_as_its_sine():
+    """τ = −m g l sin q, and its slope −m g l cos q."""
+    q = np.linspace(-1.0, 1.0, 4001)[:, None]
+    gravity = mount_gravity(pendulum(), UPRIGHT)
+    bodies = bodies_along(pendulum(), ("a",), at_rest(q), gravity)
+    assert bodies.weight == pytest.approx(-MASS * G * LENGTH * np.sin(q), abs=1e-6)
+    slope = -MASS * G * LENGTH * np.cos(q)
+    assert bodies.weight_slope == pytest.approx(slope, abs=1e-6)
+    inertia = MASS * LENGTH**2 + ARMATURE
+    assert bodies.inertia == pytest.approx(inertia, rel=1e-5)
+
+
+def test_nothing_pushes_a_joint_that_is_alone():
+    rng = np.random.default_rng(0)
+    motion = JointMotion(*rng.normal(size=(3, 50, 1)))
+    gravity = mount_gravity(pendulum(), UPRIGHT)
+    bodies = bodies_along(pendulum(), ("a",), motion, gravity)
+    assert np.all(bodies.push == 0.0)
+
+
+def test_a_mount_that_lies_on_its_side_turns_gravity():
+    half = np.sqrt(0.5)
+    assert mount_gravity(pendulum(), (half, 0.0, half, 0.0)) == pytest.approx(
+        [G, 0.0, 0.0]
+    )
+
+
+def test_values_between_rows_lie_on_lines_and_stay_after_the_last():
+    found = interpolated(np.array([0, 2]), np.array([[0.0], [4.0]]), 5)
+    assert found[:, 0].tolist() == [0.0, 2.0, 4.0, 4.0, 4.0]
