@@ -50,7 +50,7 @@ def watched():
 
 
 def ends_well(capsys, path, inside: Path) -> bool:
-    """Gives a log to the command; tells whether it was refused."""
+    """Passes a log to the command and returns whether it was refused."""
     began, before = time.process_time(), _most_bytes()
     with watched() as opened:
         status = main(["sysid", "info", str(path)])

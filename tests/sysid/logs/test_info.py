@@ -35,6 +35,6 @@ def test_the_command(tmp_path, capsys):
     assert main(["sysid", "info", str(tmp_path / "x.parquet")]) == 0
     assert "pos.knee" in capsys.readouterr().out
     assert main(["sysid", "info", str(tmp_path / "none.csv")]) == 2
-    told = capsys.readouterr().err
-    assert "no such file" in told
-    assert told.count("\n") == 1
+    message = capsys.readouterr().err
+    assert "no such file" in message
+    assert message.count("\n") == 1
