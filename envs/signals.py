@@ -9,8 +9,8 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Shaped
 
-from envs.hand.figures import figures
 from envs.hand.model import PALM, PAYLOAD, V_SITE
+from envs.hand.nominal import vendor_hand
 from envs.hand.spec import (
     JOINT_QPOS,
     JOINT_QVEL,
@@ -131,7 +131,7 @@ def extract_signals(
         joint_pos=state.qpos[JOINT_QPOS],
         joint_vel=joint_vel,
         joint_acc=(joint_vel - before.qvel[JOINT_QVEL]) / dt_s,
-        torque_nm=_stack(spec, sensors, "torque", figures().joint_names)[:, 0],
+        torque_nm=_stack(spec, sensors, "torque", vendor_hand().joint_names)[:, 0],
         palm_pos_w=state.qpos[:3],
         palm_quat_w=quat_w,
         gravity_b=gravity(quat_w),

@@ -16,9 +16,9 @@ from jaxtyping import Float, Int
 from envs.actuator.catalogue import effect_kind
 from envs.config.typed import load_yaml
 from envs.errors import InputError, one_of
-from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import build_spec
+from envs.hand.nominal import FINGERS, vendor_hand
 from envs.physics.quiet_mujoco import mujoco
 
 SCHEMA = 1
@@ -240,7 +240,7 @@ def _hand_drive(hand: HandFile, index: int) -> JointDrive:
 
 def _hand_classes() -> dict[str, tuple[str, ...]]:
     """Joints of the hand by kind and by finger; joint 2 of a finger abducts."""
-    names = figures().joint_names
+    names = vendor_hand().joint_names
     by_number = {
         i: tuple(n for n in names if n.endswith(f"joint{i}")) for i in range(5)
     }

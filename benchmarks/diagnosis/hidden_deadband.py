@@ -16,13 +16,8 @@ import numpy as np
 from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
-from envs.hand.hand_file import (
-    EFFECTS,
-    Effect,
-    Quantity,
-    load_hand_file,
-    save_hand_file,
-)
+from envs.hand.hand_file import EFFECTS, Effect, load_hand_file, save_hand_file
+from envs.hand.quantity import Quantity
 from sysid.logs.log import MeasuredLog
 from sysid.logs.read import write_log
 

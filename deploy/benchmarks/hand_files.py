@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 import fingers_mjx
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
+from envs.hand.nominal import vendor_hand
 from envs.hand.stance import load_stance
 from envs.hand.standing_mjcf import standing_mjcf
 from envs.registry import make_batch
@@ -55,7 +55,7 @@ def _joint_speeds() -> tuple[float, ...]:
 def hand_interface() -> Interface:
     """The crawl interface of the calibrated hand."""
     stance = load_stance()
-    links = figures().links
+    links = vendor_hand().links
     return Interface(
         joint_names=tuple(link.joint for link in links),
         reference_angles_rad=stance.joint_pos_rad,

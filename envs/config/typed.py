@@ -19,6 +19,11 @@ T = TypeVar("T")
 MAX_YAML_BYTES = 1 << 20
 
 
+def limits(unit: str, low: float, high: float) -> dict[str, Any]:
+    """Metadata of a field: its unit and the range of every number in it."""
+    return {"unit": unit, "low": low, "high": high}
+
+
 def from_dict(cls: type[T], data: object, source: object, field: str = "") -> T:
     """Builds a configuration from plain data, checking every type, name and range.
 

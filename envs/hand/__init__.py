@@ -1,1 +1,1 @@
-"""The hand: its figures, model file, MuJoCo model, drive and stance."""
+"""The hand: nominal parameters, hand file, MuJoCo model, drive and stance."""

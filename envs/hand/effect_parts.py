@@ -4,8 +4,8 @@ import mujoco
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import EffectKind, Stage
-from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile
+from envs.hand.nominal import FINGERS, vendor_hand
 
 SLIGHT_FRICTION_NM = 1e-6
 """A friction that is there, so that a world may have more: MJX plans its constraints
@@ -19,7 +19,7 @@ def kinds_of(hand: HandFile) -> tuple[EffectKind, ...]:
 
 
 def load_sensor(joint: str) -> str:
-    """Name of the sensor that tells the torque which the links put on a joint."""
+    """Name of the sensor of the torque that the links put on a joint."""
     return f"load_{joint}"
 
 
@@ -38,7 +38,7 @@ def add_effect_parts(spec: mujoco.MjSpec, hand: HandFile, floor: str) -> None:
     """
     kinds = kinds_of(hand)
     if any(Stage.FRICTION in kind.acts for kind in kinds):
-        for name in figures().joint_names:
+        for name in vendor_hand().joint_names:
             spec.joint(name).frictionloss = SLIGHT_FRICTION_NM
     if any(kind.uses_load for kind in kinds):
         _add_load_sensors(spec)
@@ -53,7 +53,7 @@ def friction_rows(model: mujoco.MjModel) -> int:
 
 def _add_load_sensors(spec: mujoco.MjSpec) -> None:
     """Adds the torque between each link and its parent, in the frame of the joint."""
-    for link in figures().links:
+    for link in vendor_hand().links:
         spec.body(link.body).add_site(name=load_sensor(link.joint))
         spec.add_sensor(
             name=load_sensor(link.joint),
@@ -65,7 +65,7 @@ def _add_load_sensors(spec: mujoco.MjSpec) -> None:
 
 def _add_pairs(spec: mujoco.MjSpec, floor: str) -> None:
     """Puts explicit pairs in the place of the contacts of fingertips and floor."""
-    tips = [link for link in figures().links if link.tip]
+    tips = [link for link in vendor_hand().links if link.tip]
     for finger, link in zip(FINGERS, tips, strict=True):
         sphere = spec.geom(f"{link.body}_tip")
         sphere.conaffinity = 0

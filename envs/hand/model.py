@@ -1,4 +1,4 @@
-"""The MuJoCo model of the hand: primitives from the figures, sensors for the signals.
+"""The MuJoCo model of the hand: primitives of its nominal size, sensors for signals.
 
 Geometry is our own: one capsule per finger link (link 1 is inside the palm's reach and
 carries none), a box for the palm and one for the dorsal module. A fingertip meets the
@@ -9,15 +9,15 @@ the hand file.
 """
 
 import numpy as np
+from jaxtyping import Float
 
 from envs.hand.effect_parts import add_effect_parts
-from envs.hand.figures import FINGERS, Link
 from envs.hand.hand_file import HandFile
+from envs.hand.model_sensors import FLOOR, PALM, PAYLOAD, V_SITE, add_sensors
+from envs.hand.nominal import FINGERS, Link
 from envs.physics.quiet_mujoco import mujoco
 
 PHYSICS_DT_S = 0.005
-FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"
-V_SITE = "control_frame"
 
 # Contact groups as bits: what stands on the floor, and what the hand meets otherwise.
 _FLOOR_BIT, _HAND_BIT = 1, 2
@@ -33,16 +33,23 @@ _PALM_COLOUR = (0.82, 0.82, 0.84, 1.0)
 _PAYLOAD_COLOUR = (0.25, 0.27, 0.30, 1.0)
 
 
-def build_spec(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjSpec:
+def build_spec(
+    hand: HandFile, q_off: Float[np.ndarray, "4"] | None = None
+) -> mujoco.MjSpec:
     """Builds the scene: floor, hand with a free root, position drives and sensors.
+
+    Drives compute τ = clip(kp (c − q) − kd q̇, ±τ_max) [N·m].
 
     Args:
         hand: the hand file.
-        q_off: orientation of the control frame V in the palm, w x y z; identity when
-            the stance is not known yet.
+        q_off: orientation of the control frame V in the palm, w x y z, of length 1 [1];
+            identity when the stance is not known yet.
 
     Returns:
         An uncompiled specification; `spec.to_xml()` after `compile()` gives the MJCF.
+
+    Source:
+        WUJI right hand description 2026.04.27 and the hand file; geometry ours.
     """
     spec = mujoco.MjSpec()
     spec.modelname = "wuji_right_primitive"
@@ -54,13 +61,23 @@ def build_spec(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjSpec
         parent = _add_link(palm if index % 4 == 0 else parent, link, index, hand)
         _add_drive(spec, link, index, hand)
     _exclude_neighbours(spec)
-    _add_sensors(spec, hand)
+    add_sensors(spec, hand)
     add_effect_parts(spec, hand, FLOOR)
     return spec
 
 
-def build_model(hand: HandFile, q_off: np.ndarray | None = None) -> mujoco.MjModel:
-    """Compiles `build_spec`."""
+def build_model(
+    hand: HandFile, q_off: Float[np.ndarray, "4"] | None = None
+) -> mujoco.MjModel:
+    """Compiles `build_spec`: model = compile(spec(hand, V)) [m, kg, s, rad].
+
+    Args:
+        hand: the hand file.
+        q_off: orientation of the control frame V in the palm, w x y z [1].
+
+    Source:
+        See `build_spec`.
+    """
     return build_spec(hand, q_off).compile()
 
 
@@ -90,21 +107,21 @@ def _add_floor(spec: mujoco.MjSpec, hand: HandFile) -> None:
 
 
 def _add_palm(
-    spec: mujoco.MjSpec, hand: HandFile, q_off: np.ndarray | None
+    spec: mujoco.MjSpec, hand: HandFile, q_off: Float[np.ndarray, "4"] | None
 ) -> mujoco.MjsBody:
-    palm_figures = hand.nominal.palm
+    nominal = hand.nominal.palm
     mass = hand.palm_mass.value
     palm = spec.worldbody.add_body(
         name=PALM,
         mass=mass,
-        ipos=np.add(palm_figures.inertial_pos, hand.palm_com_offset.value),
-        iquat=palm_figures.inertial_quat,
-        # The figures' inertia belongs to the vendor's lighter palm: same shape, scaled.
-        inertia=np.multiply(palm_figures.diaginertia, mass / palm_figures.mass),
+        ipos=np.add(nominal.inertial_pos, hand.palm_com_offset.value),
+        iquat=nominal.inertial_quat,
+        # The nominal inertia belongs to the vendor's lighter palm: same shape, scaled.
+        inertia=np.multiply(nominal.diaginertia, mass / nominal.mass),
         explicitinertial=True,
     )
     palm.add_freejoint(name="root")
-    low, high = np.array(palm_figures.bounds_min), np.array(palm_figures.bounds_max)
+    low, high = np.array(nominal.bounds_min), np.array(nominal.bounds_max)
     _add_box(palm, PALM, (low + high) / 2, (high - low) / 2, _PALM_COLOUR, hand)
     palm.add_site(
         name=V_SITE, quat=[1, 0, 0, 0] if q_off is None else q_off, size=[0.004]
@@ -233,57 +250,3 @@ def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
             spec.add_exclude(bodyname1=other, bodyname2=f"finger{finger}_link2")
     for other in (2, 3):  # the thumb's first free link lies along the index's base
         spec.add_exclude(bodyname1=PALM, bodyname2=f"finger1_link{other}")
-
-
-def _add_sensors(spec: mujoco.MjSpec, hand: HandFile) -> None:
-    """Adds what `envs.signals` reads; names are `<quantity>_<object>`."""
-    frame = {
-        "quat": mujoco.mjtSensor.mjSENS_FRAMEQUAT,
-        "pos": mujoco.mjtSensor.mjSENS_FRAMEPOS,
-        "linvel": mujoco.mjtSensor.mjSENS_FRAMELINVEL,
-        "angvel": mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
-    }
-    sites = [(V_SITE, ("pos", "quat", "linvel", "angvel"))]
-    sites += [(f"{f}_tip", ("pos", "quat", "linvel")) for f in FINGERS]
-    for site, kinds in sites:
-        for kind in kinds:
-            spec.add_sensor(
-                name=f"{kind}_{site}",
-                type=frame[kind],
-                objtype=mujoco.mjtObj.mjOBJ_SITE,
-                objname=site,
-            )
-    for link in hand.nominal.links:
-        spec.add_sensor(
-            name=f"torque_{link.joint}",
-            type=mujoco.mjtSensor.mjSENS_JOINTACTFRC,
-            objtype=mujoco.mjtObj.mjOBJ_JOINT,
-            objname=link.joint,
-        )
-    for link in hand.nominal.links:
-        if link.tip:
-            _add_contact_sensor(spec, f"{link.body}_tip", force=True)
-    for link in hand.nominal.links:
-        if link.capsule and not link.tip:
-            _add_contact_sensor(spec, link.body, force=False)
-    _add_contact_sensor(spec, PALM, force=False)
-    _add_contact_sensor(spec, PAYLOAD, force=False)
-
-
-def _add_contact_sensor(spec: mujoco.MjSpec, geom: str, force: bool) -> None:
-    """Adds the contact force with the floor, or the number of contacts with it.
-
-    A sphere meets a plane in one point, so the force of one contact is all of it.
-    """
-    data = mujoco.mjtConDataField
-    field = data.mjCONDATA_FORCE if force else data.mjCONDATA_FOUND
-    mindist = 1  # MJX matches geoms only where it also sorts
-    spec.add_sensor(
-        name=f"{'force' if force else 'found'}_{geom}",
-        type=mujoco.mjtSensor.mjSENS_CONTACT,
-        objtype=mujoco.mjtObj.mjOBJ_GEOM,
-        objname=geom,
-        reftype=mujoco.mjtObj.mjOBJ_GEOM,
-        refname=FLOOR,
-        intprm=[1 << int(field), mindist, 1],
-    )

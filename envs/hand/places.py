@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Mapping
 
 from envs.errors import InputError, one_of
-from envs.hand.figures import FINGERS, figures
+from envs.hand.nominal import FINGERS, vendor_hand
 
 
 def _places() -> dict[str, tuple[str, ...]]:
     """Joint 2 of a finger abducts; joints 3 and 4 are PIP and DIP."""
-    names = figures().joint_names
+    names = vendor_hand().joint_names
     number = {n: names[n - 1 :: 4] for n in range(1, 5)}
     classes = {
         "all": names,
@@ -36,7 +36,7 @@ def joints_at(where: Iterable[str]) -> tuple[int, ...]:
         if place not in PLACES:
             raise InputError("hand file", "where", place, one_of(PLACES, place))
         found |= set(PLACES[place])
-    return tuple(i for i, n in enumerate(figures().joint_names) if n in found)
+    return tuple(i for i, n in enumerate(vendor_hand().joint_names) if n in found)
 
 
 def fingers_at(where: Iterable[str]) -> tuple[int, ...]:

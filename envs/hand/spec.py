@@ -7,14 +7,14 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.errors import InputError
-from envs.hand.figures import FINGERS, figures
 from envs.hand.model import PALM, PAYLOAD
+from envs.hand.nominal import FINGERS, vendor_hand
 
 TIP_SITES = tuple(f"{finger}_tip" for finger in FINGERS)
-TIP_LINKS = tuple(link.body for link in figures().links if link.tip)
+TIP_LINKS = tuple(link.body for link in vendor_hand().links if link.tip)
 TIP_SPHERES = tuple(f"{link}_tip" for link in TIP_LINKS)
 OTHER_LINKS = tuple(
-    link.body for link in figures().links if link.capsule and not link.tip
+    link.body for link in vendor_hand().links if link.capsule and not link.tip
 )
 HAND_NQ, HAND_NV = 27, 26
 """Positions and velocities of the hand, which come first in every scene."""
@@ -40,7 +40,15 @@ class HandSpec:
     joint_range_rad: np.ndarray
 
     def read(self, sensordata: Float[Array, " n"], name: str) -> Float[Array, " m"]:
-        """One sensor's values."""
+        """One sensor's values: x = sensordata[adr : adr + dim] [N, N·m, m, m/s, 1].
+
+        Args:
+            sensordata: all sensors, each in its own unit.
+            name: of the sensor, `<quantity>_<object>`.
+
+        Source:
+            MuJoCo documentation, `mjData.sensordata`.
+        """
         return sensordata[self.sensors[name]]
 
 
@@ -50,7 +58,7 @@ def hand_spec(model: mujoco.MjModel) -> HandSpec:
     Raises:
         InputError: the joints of the hand are not the first ones of the model.
     """
-    names = figures().joint_names
+    names = vendor_hand().joint_names
     joints = [model.joint(name).id for name in names]
     found = (model.jnt_qposadr[joints], model.jnt_dofadr[joints])
     wanted = (np.arange(HAND_NQ)[JOINT_QPOS], np.arange(HAND_NV)[JOINT_QVEL])

@@ -12,11 +12,12 @@ from importlib.resources import files
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PALM, PHYSICS_DT_S, build_model
+from envs.hand.nominal import FINGERS
 
 SETTLE_S = 4.0
 _FORWARD_LINKS = tuple(f"finger{number}_link4" for number in (2, 3, 4, 5))
@@ -52,7 +53,7 @@ class Stance:
 
 @cache
 def load_stance(package: str = "envs.hand", name: str = "stance.json") -> Stance:
-    """Reads a stored stance, the crawl stance if not told otherwise."""
+    """Reads a stored stance, the crawl stance if not given."""
     raw = json.loads(files(package).joinpath(name).read_text("utf-8"))
     lists = {k: tuple(v) for k, v in raw.items() if isinstance(v, list)}
     lists["footprint_v"] = tuple(tuple(tip) for tip in raw["footprint_v"])
@@ -84,16 +85,21 @@ def stance_json(stance: Stance) -> str:
     return json.dumps(asdict(stance), indent=1) + "\n"
 
 
-def settle(hand: HandFile, qpos: np.ndarray, target: np.ndarray) -> Stance:
-    """Holds joint targets for 4 s and records the settled stance.
+def settle(
+    hand: HandFile, qpos: Float[np.ndarray, "27"], target: Float[np.ndarray, "20"]
+) -> Stance:
+    """Holds joint targets and records the settled stance: s = s(4 s), max |q̇| < 0.01.
 
     Args:
         hand: the hand file.
-        qpos: start of the settling (27), tips at the floor.
-        target: joint targets to hold [rad] (20).
+        qpos: start of the settling [m, rad], tips at the floor.
+        target: joint targets to hold [rad].
 
     Raises:
         InputError: the hand falls, or still moves after 4 s.
+
+    Source:
+        Paper, settled stance.
     """
     model = build_model(hand)
     data = mujoco.MjData(model)

@@ -15,13 +15,13 @@ from jaxtyping import Float
 from scipy.optimize import OptimizeResult, minimize
 
 from envs.errors import InputError
-from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PALM, build_model
+from envs.hand.nominal import FINGERS
 from envs.hand.spec import TIP_SPHERES
+from envs.hand.support import lifted_margins, support_margins
 
 _RANGE_MARGIN_RAD = 0.1
-_HULL = [0, 4, 3, 2, 1]  # thumb, little, ring, middle, index: around the footprint
 _NEIGHBOURS = ((1, 2), (2, 3), (3, 4), (0, 1), (0, 4))
 _STEPS_W = np.array([[0.020, 0.0, 0.0], [0.0, 0.0, 0.015]])  # a step forward, a lift
 
@@ -67,8 +67,10 @@ def search_stance(
     seed: int = 0,
     starts: int = 40,
     weights: StanceWeights | None = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Finds the best of several local optima (SLSQP) from random starts.
+) -> tuple[Float[np.ndarray, "27"], Float[np.ndarray, "20"]]:
+    """Finds the best of several local optima: arg min Σ r(x)², tip gaps(x) = 0.
+
+    SLSQP from random starts.
 
     Args:
         hand: the hand file.
@@ -77,10 +79,14 @@ def search_stance(
         weights: weights of the preferences.
 
     Returns:
-        qpos (27) with the tips at the floor, and the joint targets [rad] (20).
+        qpos with the tips at the floor [m, rad], and the joint targets [rad].
 
     Raises:
         InputError: no start ended with five tips down.
+
+    Source:
+        Ours; the paper does not give its stance. SLSQP: D. Kraft, A software package
+        for sequential quadratic programming, DFVLR-FB 88-28, 1988.
     """
     problem = StanceProblem(hand, weights or StanceWeights())
     rng = np.random.default_rng(seed)
@@ -113,13 +119,25 @@ class StanceProblem:
         self._palm = model.geom(PALM).id
 
     def random_start(self, rng: np.random.Generator) -> Float[np.ndarray, "23"]:
-        """A random pose within the joint ranges."""
+        """A random pose: q_j ∈ U(range less a margin), pitch ∈ U(−0.9, 0.9) [rad].
+
+        Source:
+            Ours.
+        """
         inner = 1.5 * _RANGE_MARGIN_RAD
         joints = rng.uniform(self.low + inner, self.high - inner)
         return np.r_[rng.uniform(-0.9, 0.9), rng.uniform(-0.2, 0.2), 0.1, joints]
 
     def solve(self, start: Float[np.ndarray, "23"]) -> OptimizeResult:
-        """Runs SLSQP from one start."""
+        """Runs SLSQP from one start: arg min Σ r(x)² with tip gaps(x) = 0.
+
+        Args:
+            start: pitch, roll [rad], height [m] and 20 joint angles [rad].
+
+        Source:
+            D. Kraft, A software package for sequential quadratic programming,
+            DFVLR-FB 88-28, 1988.
+        """
         margin = _RANGE_MARGIN_RAD
         joints = zip(self.low + margin, self.high - margin, strict=True)
         return minimize(
@@ -132,16 +150,37 @@ class StanceProblem:
         )
 
     def qpos(self, x: Float[np.ndarray, "23"]) -> Float[np.ndarray, "27"]:
-        """Generalized position of an x."""
+        """Generalized position of an x: q = (0, 0, height, quaternion, joint angles).
+
+        Args:
+            x: pitch, roll [rad], height [m] and 20 joint angles [rad].
+
+        Source:
+            MuJoCo documentation, `mjData.qpos` of a free joint.
+        """
         return np.r_[0.0, 0.0, x[2], palm_quat(x[0], x[1]), x[3:]]
 
     def tip_gaps(self, x: Float[np.ndarray, "23"]) -> Float[np.ndarray, "5"]:
-        """Gaps between tip spheres and floor [m]."""
+        """Gaps between tip spheres and floor: g = z_tip − radius [m].
+
+        Args:
+            x: pitch, roll [rad], height [m] and 20 joint angles [rad].
+
+        Source:
+            Ours.
+        """
         self._place(x)
         return self.data.site_xpos[self._tips, 2] - self._tip_radius
 
     def residuals(self, x: Float[np.ndarray, "23"]) -> Float[np.ndarray, " n"]:
-        """All preferences; their squares add up to the cost."""
+        """All preferences r, each = weight × shortfall / scale [1]; cost = Σ r².
+
+        Args:
+            x: pitch, roll [rad], height [m] and 20 joint angles [rad].
+
+        Source:
+            Ours, see `StanceWeights`.
+        """
         self._place(x)
         w, tips = self.weights, self.data.site_xpos[self._tips]
         com = self.data.subtree_com[1]
@@ -203,41 +242,18 @@ class StanceProblem:
         )
 
 
-def support_margins(
-    point: Float[np.ndarray, "2"],
-    tips: Float[np.ndarray, "5 2"],
-    lifted: int | None = None,
-) -> Float[np.ndarray, " n"]:
-    """Signed distances [m] of a point to the footprint's edges, inside positive.
-
-    Args:
-        point: such as the centre of mass on the floor [m].
-        tips: of the five fingers on the floor [m].
-        lifted: finger that does not support; none if not given.
-    """
-    start = tips[[finger for finger in _HULL if finger != lifted]]
-    edge = np.roll(start, -1, axis=0) - start
-    area = np.sum(start[:, 0] * np.roll(start[:, 1], -1))
-    area -= np.sum(np.roll(start[:, 0], -1) * start[:, 1])
-    normal = np.stack([-edge[:, 1], edge[:, 0]], axis=1) * np.sign(area)
-    normal /= np.linalg.norm(edge, axis=1, keepdims=True) + 1e-9
-    return np.sum(normal * (point - start), axis=1)
-
-
-def lifted_margins(
-    point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "5 2"]
-) -> Float[np.ndarray, "5"]:
-    """Least margin [m] of a point on the other four tips, with each finger lifted."""
-    return np.array(
-        [support_margins(point, tips, lifted).min() for lifted in range(len(FINGERS))]
-    )
-
-
 def palm_quat(pitch_rad: float, roll_rad: float) -> Float[np.ndarray, "4"]:
     """Palm orientation, w x y z: palm side down, fingers forward, then pitch and roll.
 
-    At zero the palm's +x points down and its +z along world x; positive pitch lowers
-    the fingers, positive roll raises the thumb side.
+    q = q_x(roll) q_y(pitch) q₀. At zero the palm's +x points down and its +z along
+    world x; positive pitch lowers the fingers, positive roll raises the thumb side.
+
+    Args:
+        pitch_rad: about world y [rad].
+        roll_rad: about world x, after it [rad].
+
+    Source:
+        Ours.
     """
     quat = np.array([np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
     for axis, angle in (([0.0, 1.0, 0.0], pitch_rad), ([1.0, 0.0, 0.0], roll_rad)):

@@ -155,12 +155,12 @@ def import_mjcf(args: argparse.Namespace) -> int:
     """Imports, lists what was filled in, and writes the hand file."""
     from envs.config.typed import load_yaml
     from envs.hand.hand_file import hand_yaml
-    from envs.hand.importing.figures import import_hand
+    from envs.hand.importing.convert import import_hand
 
     options.check_file("--out", args.out)
     given = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
     found = import_hand(args.mjcf, given.joints, given.palm_quat)
-    for sentence in found.told:
+    for sentence in found.notes:
         print(sentence)
     print(_standing(found.hand))
     _write(hand_yaml(found.hand), args.out)

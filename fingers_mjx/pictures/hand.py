@@ -8,12 +8,12 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from scipy.spatial import ConvexHull
 
-from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
 from envs.hand.model import V_SITE, build_model
+from envs.hand.nominal import FINGERS
 from envs.hand.spec import TIP_SITES
 from envs.hand.stance import Stance
-from envs.hand.stance_search import support_margins
+from envs.hand.support import support_margins
 from fingers_mjx.pictures.camera import Camera
 from fingers_mjx.pictures.overlay import (
     Area,

@@ -11,7 +11,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.hand.figures import figures
+from envs.hand.nominal import vendor_hand
 from envs.physics import PhysicsState
 from fingers_deploy.rotations import multiply
 from fingers_mjx.play.player import Played, Player, Schedule
@@ -79,7 +79,7 @@ class WalkRecorder(Player):
 
 
 def _log(rows, dt: float, rng: np.random.Generator, noise: WalkNoise) -> MeasuredLog:
-    names, columns = figures().joint_names, {}
+    names, columns = vendor_hand().joint_names, {}
     gathered = {k: np.stack([row[k] for row in rows]) for k in rows[0] if k != "after"}
     size = {"pos": noise.joint_rad, "tau": noise.effort_nm, "cmd": 0.0}
     for quantity, sigma in size.items():

@@ -21,7 +21,7 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.hand.drive.drive import DriveState
-from envs.hand.figures import figures
+from envs.hand.nominal import vendor_hand
 from envs.memory import Memory, PerWorldState
 from envs.observations import Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
@@ -64,7 +64,7 @@ class Player:
     def __init__(self, env: BatchEnv, bundle: Bundle, runtime: Runtime = "auto"):
         self.env = env
         self.controller = PolicyController(bundle, runtime)
-        self.controller.check_joint_order(figures().joint_names)
+        self.controller.check_joint_order(vendor_hand().joint_names)
         self._inputs = PlayInputs(env)
         self._reset = jax.jit(env.env.reset)
         self._read: Callable[..., Sample] = jax.jit(self._reading)

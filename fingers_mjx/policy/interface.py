@@ -8,8 +8,8 @@ from typing import Any
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
-from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
+from envs.hand.nominal import vendor_hand
 from envs.observations import HISTORY, TERMS, InputTerm
 from fingers_deploy.manifest import (
     Action,
@@ -42,7 +42,7 @@ def interface_of(env: BatchEnv) -> Interface:
     inputs = env.input_terms
     terms = tuple(_term(term) for term in (*(_TERMS[name] for name in TERMS), *inputs))
     return Interface(
-        joint_names=figures().joint_names,
+        joint_names=vendor_hand().joint_names,
         reference_angles_rad=stance.joint_pos_rad,
         joint_limits_rad=tuple((low, high) for low, high in limits),
         initial_target_rad=stance.target_rad,

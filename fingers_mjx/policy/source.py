@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from envs.errors import InputError
-from envs.hand.figures import figures
+from envs.hand.nominal import vendor_hand
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.bundle import POLICY_FILE
 from fingers_mjx.policy.actor import Network, load_policy
@@ -90,7 +90,7 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
         BundleError: a bundle that is damaged or made for another hand.
     """
     _check_kind(path)
-    bundle = load_bundle(path, figures().joint_names)
+    bundle = load_bundle(path, vendor_hand().joint_names)
     directory = path if path.is_dir() else path.parent
     found = config_digest(directory)
     wanted = bundle.manifest.provenance.config_sha256

@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from envs.hand.figures import FINGERS
+from envs.hand.nominal import FINGERS
 
 # Okabe and Ito's palette, distinct for colour-blind readers.
 FINGER_COLOURS = ("#D55E00", "#0072B2", "#009E73", "#CC79A7", "#E69F00")

@@ -19,8 +19,9 @@ from jaxtyping import Float
 from scipy.stats import t as student
 
 from envs.errors import InputError
-from envs.hand.figures import figures
-from envs.hand.hand_file import HandFile, JointQuantity, Quantity
+from envs.hand.hand_file import HandFile
+from envs.hand.nominal import vendor_hand
+from envs.hand.quantity import JointQuantity, Quantity
 from sysid.calibration.friction import Pull, is_pull, pull_of
 from sysid.calibration.joint import JointFit, fit_joint
 from sysid.logs.log import MeasuredLog
@@ -173,7 +174,7 @@ def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
     Joints that were not measured keep stiffness, damping and speed.
     """
     source = f"identified from {found.digest}"
-    names, changes = figures().joint_names, {}
+    names, changes = vendor_hand().joint_names, {}
     gains = {"stiffness_scale": "stiffness", "damping_scale": "damping"}
     fits = {j: f for j, f in found.joints.items() if j in names}
     for field, parameter in gains.items():

@@ -9,8 +9,9 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.hand.figures import FINGERS
-from envs.hand.hand_file import Effect, HandFile, Quantity
+from envs.hand.hand_file import Effect, HandFile
+from envs.hand.nominal import FINGERS
+from envs.hand.quantity import Quantity
 
 NUISANCE = "tip_friction"
 """What every hypothesis may choose along: floors differ."""

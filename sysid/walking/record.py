@@ -15,8 +15,8 @@ from scipy.signal import savgol_filter
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.hand.drive.servo import servo_drive
-from envs.hand.figures import figures
 from envs.hand.model import PHYSICS_DT_S
+from envs.hand.nominal import vendor_hand
 from sysid.logs.log import MeasuredLog
 
 _AXES = ("x", "y", "z")
@@ -59,7 +59,7 @@ def walk_record(log: MeasuredLog, env: BatchEnv) -> WalkRecord:
         InputError: a hand on a stand, other joints than the hand's, rows that are
             uneven or missing, columns that a walk needs, or too short a walk.
     """
-    names = figures().joint_names
+    names = vendor_hand().joint_names
     if log.header.mounting != "free":
         valid = "free: a hand that walks"
         raise InputError(log.source, "mounting", log.header.mounting, valid)

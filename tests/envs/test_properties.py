@@ -12,20 +12,16 @@ from hypothesis.extra.numpy import arrays
 from support.properties import counts, holds
 
 from envs.config.typed import dump_yaml, from_dict, load_yaml, override, to_dict
-from envs.hand.figures import figures
-from envs.hand.hand_file import (
-    HandFile,
-    JointQuantity,
-    load_hand_file,
-    save_hand_file,
-)
+from envs.hand.hand_file import HandFile, load_hand_file, save_hand_file
+from envs.hand.nominal import vendor_hand
+from envs.hand.quantity import JointQuantity
 from envs.randomize import RandomizeConfig
 from envs.registry import make_env
 from envs.tasks.crawl import CrawlConfig
 
 ENV = make_env("crawl")
 HAND = load_hand_file()
-JOINTS = figures().joint_names
+JOINTS = vendor_hand().joint_names
 ANY = arrays(np.float32, 20, elements=st.floats(width=32))
 LOW, HIGH = np.asarray(ENV.plant.joint_range).T
 INSIDE = arrays(np.float32, 20, elements=st.floats(0, 1, width=32)).map(

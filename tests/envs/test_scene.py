@@ -12,9 +12,9 @@ import pytest
 from envs.commands import CommandConfig
 from envs.env import HandEnv
 from envs.errors import InputError
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
+from envs.hand.nominal import vendor_hand
 from envs.hand.spec import HAND_NQ, HAND_NV, hand_spec
 from envs.hand.stance import load_stance
 from envs.scene import build_scene
@@ -125,7 +125,7 @@ def test_bodies_before_the_hand_are_refused():
     palm = spec.worldbody.add_body(name="palm")
     palm.add_freejoint(name="root")
     palm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0, 0])
-    for name in figures().joint_names:
+    for name in vendor_hand().joint_names:
         palm = palm.add_body(name=f"{name}_link")
         palm.add_joint(name=name)
         palm.add_geom(type=mujoco.mjtGeom.mjGEOM_SPHERE, size=[0.01, 0, 0])

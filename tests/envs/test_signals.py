@@ -8,9 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, V_SITE, build_model
+from envs.hand.nominal import FINGERS, vendor_hand
 from envs.hand.spec import OTHER_LINKS, TIP_SPHERES, hand_spec
 from envs.hand.stance import load_stance
 from envs.physics import PhysicsOutput, PhysicsState
@@ -217,6 +217,6 @@ def test_heading_and_place_change_nothing_in_v(moving):
 
 def test_names_follow_the_order_of_the_figures():
     assert len(OTHER_LINKS) == 10 and len(TIP_SPHERES) == 5
-    assert [link.joint for link in figures().links] == [
+    assert [link.joint for link in vendor_hand().links] == [
         MODEL.actuator(i).name for i in range(20)
     ]

@@ -3,15 +3,15 @@
 import jax.numpy as jnp
 import numpy as np
 
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
+from envs.hand.nominal import vendor_hand
 from envs.tasks.keyboard.stance import JOINTS, fingertip_v, keyboard_stance
 from fingers_deploy.fingertip import FIRST_JOINT, pressing_fingertip
 
 
 def test_shim_and_training_agree_over_the_joint_ranges():
     q_off = keyboard_stance(load_hand_file()).q_off
-    low, high = figures().per_joint("range_rad").T
+    low, high = vendor_hand().per_joint("range_rad").T
     rng = np.random.default_rng(11)
     for _ in range(20):
         joints = rng.uniform(low, high)

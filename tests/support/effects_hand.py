@@ -7,7 +7,8 @@ import jax.numpy as jnp
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.hand.hand_file import Effect, Quantity, load_hand_file
+from envs.hand.hand_file import Effect, load_hand_file
+from envs.hand.quantity import Quantity
 from envs.randomize import model_fields, no_randomization
 from envs.registry import make_env
 from envs.sensing import imu_of

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
+from envs.hand.nominal import vendor_hand
 
 KINDS = ("pendulum", "joint", "finger", "hand")
 TOLERANCES = {
@@ -91,10 +91,10 @@ def _pendulum(rng: np.random.Generator, lowpass_hz: float) -> Stand:
 
 def _finger(finger: int, rng: np.random.Generator, lowpass_hz: float):
     """A finger of the hand (1 to 4; the thumb is left out) on a palm that is turned."""
-    hand, names = load_hand_file(), figures().joint_names
+    hand, names = load_hand_file(), vendor_hand().joint_names
     links, joints, middle, reach = [], [], [], []
     for i in range(4 * finger, 4 * finger + 4):
-        link = figures().links[i]
+        link = vendor_hand().links[i]
         parent = "world" if i == 4 * finger else names[i - 1]
         links.append(
             Link(

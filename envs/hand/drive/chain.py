@@ -18,8 +18,8 @@ from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import EffectKind, Params, Substep
 from envs.actuator.surroundings import Surroundings
 from envs.hand.effect_parts import load_sensor
-from envs.hand.figures import figures
 from envs.hand.hand_file import HandFile
+from envs.hand.nominal import vendor_hand
 from envs.hand.places import joints_at
 from envs.hand.spec import JOINT_QPOS, JOINT_QVEL, hand_spec
 from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
@@ -185,7 +185,7 @@ def chain_drive(
     for name, kind in CATALOGUE.items():
         links += [(kind, base[name])] if name in base else []
         links += [(kind, joint_params(hand, name))] if name in own else []
-    sensors, names = hand_spec(model).sensors, figures().joint_names
+    sensors, names = hand_spec(model).sensors, vendor_hand().joint_names
     uses_load = any(kind.uses_load for kind, _ in links)
     return ChainDrive(
         kinds=tuple(kind for kind, _ in links),
@@ -204,7 +204,18 @@ def in_chain(kind: EffectKind) -> bool:
 
 
 def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, "20"]]:
-    """Returns the parameters of an effect per joint; elsewhere it vanishes."""
+    """Parameters of an effect per joint; elsewhere the values at which it vanishes.
+
+    θ_j = the file's value where the hand has the effect, else the identity's, in the
+    unit of `Parameter.unit` [N·m, rad, s, 1, …].
+
+    Args:
+        hand: the hand file.
+        name: of an effect in the catalogue.
+
+    Source:
+        Ours: one program runs all joints, with or without the effect.
+    """
     found = {k: np.full(20, v) for k, v in CATALOGUE[name].identity().items()}
     for effect in hand.effects:
         if effect.name == name:
@@ -252,5 +263,9 @@ def _others(hand: HandFile) -> tuple[int, ...]:
 
 
 def float32(params: dict[str, Float[np.ndarray, "..."]]) -> Params:
-    """Parameters as JAX computes with them."""
+    """Parameters as JAX computes with them: x ← x in single precision [N·m, 1, …].
+
+    Source:
+        Ours: states are float32, and no parameter may promote them.
+    """
     return {key: jnp.asarray(value, jnp.float32) for key, value in params.items()}

@@ -14,8 +14,8 @@ from envs.actuator.surroundings import Imu, Scene
 from envs.errors import InputError
 from envs.hand.drive.chain import float32, joint_params
 from envs.hand.effect_parts import kinds_of, pair_name
-from envs.hand.figures import FINGERS
 from envs.hand.hand_file import HandFile
+from envs.hand.nominal import FINGERS
 from envs.hand.places import fingers_at
 from envs.hand.spec import HandSpec
 from envs.physics.base import ModelFields, nominal_field
@@ -45,7 +45,7 @@ class SceneEffects:
         return fields
 
     def sense(self, imu: Imu) -> Imu:
-        """Returns what the IMU tells."""
+        """Returns what the IMU measures."""
         for kind, params in self._of("senses"):
             imu = kind.senses(params, imu)
         return imu

@@ -95,7 +95,7 @@ class ServoDrive:
     def commands(
         self, drive: CommandState, target: Float[Array, "20"]
     ) -> tuple[CommandState, Float[Array, "substeps 20"]]:
-        """Commands of one control step: c₁ … c_n of `command_step` [rad].
+        """Commands of one control step: c_k = `command_step` of c_{k−1}, k ≤ n [rad].
 
         Args:
             drive: state after the previous control step.
@@ -118,7 +118,11 @@ class ServoDrive:
         state: PhysicsState,
         target: Float[Array, "20"],
     ) -> tuple[CommandState, ModelFields, Float[Array, "substeps 20"]]:
-        """Commands of one control step, under no other fields; see `commands` [rad]."""
+        """Commands of one control step: (x, target) ↦ (x', {}, c₁ … c_n) [rad].
+
+        Source:
+            See `commands`; the gains of the servos are in the fields already.
+        """
         drive, commands = self.commands(drive, target)
         return drive, {}, commands
 

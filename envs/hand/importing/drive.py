@@ -6,29 +6,31 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.figures import figures
+from envs.hand.nominal import vendor_hand
 
 _SAME = 0.01
 """Relative difference up to which gains count as the vendor's nominal ones."""
 
 
 @dataclass(frozen=True)
-class Drive:
-    """Drive of the 20 joints.
+class ImportedDrive:
+    """Drive parameters of the 20 joints.
 
     Attributes:
-        figures: `kp` [N·m/rad], `kv` [N·m·s/rad], `force_limit` [N·m] and `armature`
+        values: `kp` [N·m/rad], `kv` [N·m·s/rad], `force_limit` [N·m] and `armature`
             [kg·m²], 20 each.
         own: which of them are the model's own and not the vendor's nominal ones.
-        told: a sentence for all that was not taken from the model.
+        notes: a sentence for all that was not taken from the model.
     """
 
-    figures: dict[str, Float[np.ndarray, "20"]]
+    values: dict[str, Float[np.ndarray, "20"]]
     own: frozenset[str]
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
-def drive_of(model: mujoco.MjModel, joints: list[int], actuators: list[int]) -> Drive:
+def drive_of(
+    model: mujoco.MjModel, joints: list[int], actuators: list[int]
+) -> ImportedDrive:
     """Reads position servos, torque limits and armatures.
 
     A servo is `kp (command − q) − kv q̇` in joint angles; damping of the joint itself
@@ -51,24 +53,24 @@ def drive_of(model: mujoco.MjModel, joints: list[int], actuators: list[int]) -> 
     }
     if not np.all(kp > 0):  # damping alone is no servo
         found["kv"] = np.zeros(20)
-    nominal = {name: figures().per_joint(name) for name in found}
-    lacking = [name for name, values in found.items() if not np.all(values > 0)]
+    nominal = {name: vendor_hand().per_joint(name) for name in found}
+    lacking = [name for name, given in found.items() if not np.all(given > 0)]
     own = {
         name
-        for name, values in found.items()
-        if name not in lacking and not np.allclose(values, nominal[name], rtol=_SAME)
+        for name, given in found.items()
+        if name not in lacking and not np.allclose(given, nominal[name], rtol=_SAME)
     }
     what = {"kp": "kp of position servos", "force_limit": "torque limits"}
-    told = tuple(
-        f"no {what.get(name, name)} on all 20 joints: taken from the vendor's figures"
+    notes = tuple(
+        f"no {what.get(name, name)} on all 20 joints: the vendor's instead"
         for name in lacking
     )
     if np.any(model.dof_frictionloss[dofs] > 0):
-        told += (
+        notes += (
             "dry friction of the joints is left out: it is an effect, see effects",
         )
     chosen = {n: nominal[n] if n in lacking else found[n] for n in found}
-    return Drive(chosen, frozenset(own), told)
+    return ImportedDrive(chosen, frozenset(own), notes)
 
 
 def _servos(

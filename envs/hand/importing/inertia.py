@@ -15,7 +15,7 @@ PALM_GROUP, PAYLOAD_GROUP = 20, 21
 
 @dataclass(frozen=True)
 class Inertia:
-    """Inertial figures of a group of bodies in the frame of the group.
+    """Inertial parameters of a group of bodies in the frame of the group.
 
     Attributes:
         mass: of all bodies [kg].

@@ -2,7 +2,7 @@
 
 The file may be hostile or broken: its text and files are checked first
 (`custom_files`), then it is compiled in a child process with limits (`custom_child`),
-and only then here. What our environments need and the model lacks is told in one
+and only then here. What our environments need and the model lacks is named in one
 sentence; what can be filled in is filled in and listed.
 """
 
@@ -19,8 +19,8 @@ from pathlib import Path
 import numpy as np
 
 from envs.errors import InputError, one_of
-from envs.hand.figures import FINGERS, figures
 from envs.hand.importing.files import TIMESTEP_S, check_files
+from envs.hand.nominal import FINGERS, vendor_hand
 from envs.physics.quiet_mujoco import mujoco
 
 _CHILD = Path(__file__).with_name("child.py")
@@ -87,7 +87,7 @@ def load_custom_hand(
 
 def _their_names(joint_map: Mapping[str, str]) -> tuple[str, ...]:
     """Returns the model's names of our 20 joints."""
-    ours = figures().joint_names
+    ours = vendor_hand().joint_names
     for name in joint_map:
         if name not in ours:
             raise InputError("joint_map", str(name), name, one_of(ours, str(name)))
@@ -284,7 +284,7 @@ def _defaults(actuators: tuple[str, ...], root: str) -> tuple[str, ...]:
     """Says what the model does not bring and the environment will add."""
     sentences = []
     if not actuators:
-        sentences.append("no actuators: the drive takes the vendor's nominal figures")
+        sentences.append("no actuators: the drive takes the vendor's parameters")
     if not root:
         sentences.append("the palm is fixed: it gets a free joint")
     return tuple(sentences)

@@ -1,9 +1,9 @@
 """Where our palm frame lies in a user's model, and where its links stand in it.
 
 Our palm frame has the back of the hand at -x and the fingers at +z. The vendor's hand
-of `figures.json` tells how: its finger bases and hinge axes at zero angles are what a
-user's model is compared with. The frame of a link has its origin on the hinge and the
-hinge as +y; its +x is as near the vendor's as the hinge allows.
+defines it: its finger bases and hinge axes at zero angles are what a user's model is
+compared with. The frame of a link has its origin on the hinge and the hinge as +y; its
++x is as near the vendor's as the hinge allows.
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.figures import Figures, figures
+from envs.hand.nominal import NominalHand, vendor_hand
 
 BASES_RMS_M = 0.010
 """How far the finger bases may be from the vendor's."""
@@ -47,13 +47,20 @@ class Frame:
 
 
 def rotation(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
-    """Returns the matrix of a quaternion w x y z."""
+    """The matrix R(q) of a quaternion: R v = q v q* / |q|² [1].
+
+    Args:
+        quat: w x y z, of any length > 0 [1].
+
+    Source:
+        J. Diebel, Representing Attitude, Stanford University, 2006.
+    """
     mat = np.zeros(9)
     mujoco.mju_quat2Mat(mat, np.asarray(quat, float) / np.linalg.norm(quat))
     return mat.reshape(3, 3)
 
 
-def frames_at_zero(hand: Figures) -> list[Frame]:
+def frames_at_zero(hand: NominalHand) -> list[Frame]:
     """Returns the 20 links in the palm with all joints at zero."""
     frames: list[Frame] = []
     for index, link in enumerate(hand.links):
@@ -70,21 +77,26 @@ def palm_frame(
     """Finds our palm frame in the palm body of a user's model.
 
     It is the body's own frame where the finger bases (joints 1 and 2) lie in it as the
-    vendor's do, else the one in which they do so best.
+    vendor's do, else the one in which they do so best: arg min Σ |R x_i + p − y_i|²
+    over rotations R and places p [m].
 
     Args:
         path: of the model, for messages.
         anchors: hinge positions in the user's palm body at zero angles [m].
         palm_quat: orientation of our palm frame in that body, w x y z, where the user
-            tells it; the origin is then the body's.
+            gives it; the origin is then the body's.
 
     Raises:
         InputError: the bases are not near the vendor's in any frame.
+
+    Source:
+        W. Kabsch, A solution for the best rotation to relate two sets of vectors, Acta
+        Crystallographica A32, 1976.
     """
     if palm_quat is not None:
         return Frame(np.zeros(3), rotation(np.array(palm_quat)))
     bases = np.array([k for k in range(20) if k % 4 < 2])
-    ours = np.array([frame.pos for frame in frames_at_zero(figures())])[bases]
+    ours = np.array([frame.pos for frame in frames_at_zero(vendor_hand())])[bases]
     own = Frame(np.zeros(3), np.eye(3))
     for frame in (own, _fitted(anchors[bases], ours)):
         placed = ours @ frame.mat.T + frame.pos
@@ -104,18 +116,23 @@ def link_frames(
     axes: Float[np.ndarray, "20 3"],
     names: tuple[str, ...],
 ) -> list[Frame]:
-    """Returns the 20 links in our palm frame at zero angles.
+    """The 20 links in our palm frame at zero angles: y = hinge, x ∝ x₀ − (x₀ · y) y.
+
+    x₀ is the vendor's x axis of the link.
 
     Args:
         path: of the model, for messages.
         anchors: places of the hinges in our palm frame [m].
-        axes: their directions in it.
+        axes: their directions in it, of length 1 [1].
         names: the model's names of the joints.
 
     Raises:
         InputError: hinges that do not turn as the vendor's do.
+
+    Source:
+        Ours; Gram–Schmidt.
     """
-    vendor = [frame.mat for frame in frames_at_zero(figures())]
+    vendor = [frame.mat for frame in frames_at_zero(vendor_hand())]
     turned = [
         f"{name} ({_degrees(axis, mat[:, 1]):.0f}°)"
         for name, axis, mat in zip(names, axes, vendor, strict=True)

@@ -12,8 +12,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from envs.hand.figures import Capsule
 from envs.hand.importing.palm import Frame
+from envs.hand.nominal import Capsule
 
 _GEOM = mujoco.mjtGeom
 _SHORTEST_M = 0.001
@@ -30,15 +30,31 @@ def colliding_geoms(model: mujoco.MjModel, bodies: Iterable[int]) -> list[int]:
     return np.flatnonzero(there & np.isin(model.geom_type, solid)).tolist()
 
 
-def bounds(points: Float[np.ndarray, "n 3"]) -> tuple[np.ndarray, np.ndarray]:
-    """Least and greatest coordinates of points [m]."""
+def bounds(
+    points: Float[np.ndarray, "n 3"],
+) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+    """Bounds of points: low = min_i x_i, high = max_i x_i, by coordinate [m].
+
+    Source:
+        Ours: an axis-aligned box.
+    """
     return points.min(axis=0), points.max(axis=0)
 
 
 def surface_points(
     model: mujoco.MjModel, data: mujoco.MjData, geoms: list[int], frame: Frame
 ) -> Float[np.ndarray, "n 3"]:
-    """Returns points on the hulls of geoms, in a frame given in the world [m]."""
+    """Points on the hulls of geoms: x = Rᵀ (p + R_g x_g − o) [m].
+
+    Args:
+        model: the user's.
+        data: its pose.
+        geoms: p and R_g are their poses; primitives are sampled, meshes give vertices.
+        frame: (o, R), given in the world.
+
+    Source:
+        Ours.
+    """
     points = [
         data.geom_xpos[geom]
         + _points(model, geom) @ data.geom_xmat[geom].reshape(3, 3).T
@@ -65,7 +81,7 @@ def link_capsule(
         start, end, radius = _around(surface_points(model, data, geoms, frame))
     if np.linalg.norm(end) < np.linalg.norm(start):
         start, end = end, start
-    return _triple(start), _triple(end), _short(radius)
+    return _triple(start), _triple(end), rounded(radius)
 
 
 def _own_capsule(
@@ -167,10 +183,11 @@ def _sphere() -> Float[np.ndarray, "n 3"]:
     return np.concatenate([rings, height], axis=-1).reshape(-1, 3)
 
 
-def _short(value: float) -> float:
+def rounded(value: float) -> float:
+    """Returns a number as a hand file keeps it, to 12 digits."""
     return float(f"{value:.12g}")
 
 
 def _triple(values: np.ndarray) -> tuple[float, float, float]:
-    x, y, z = (_short(value) for value in values)
+    x, y, z = (rounded(value) for value in values)
     return x, y, z

@@ -13,8 +13,8 @@ import numpy as np
 from jaxtyping import Array, Float
 
 from envs.errors import InputError
-from envs.hand.figures import FINGERS, figures
 from envs.hand.hand_file import HandFile
+from envs.hand.nominal import FINGERS, vendor_hand
 from envs.hand.stance import Stance, load_stance, stance_of
 from envs.rotations import multiply, rotate, unrotate
 from envs.tasks.keyboard.model import Placement
@@ -40,7 +40,7 @@ def keyboard_stance(hand: HandFile) -> Stance:
         InputError: the hand has a shape of its own, or does not stand in the stance.
     """
     if hand.figures:
-        valid = "none: the task computes its fingertip with the vendor's figures"
+        valid = "none: the task computes its fingertip with the vendor's dimensions"
         raise InputError("hand file", "figures", "figures of a hand", valid)
     return stance_of(hand, load_stance("envs.tasks.keyboard"))
 
@@ -63,7 +63,7 @@ def fingertip_v(
     Source:
         Paper, keyboard pressing (encoder-based forward kinematics).
     """
-    links = figures().links[JOINTS]
+    links = vendor_hand().links[JOINTS]
     pos, quat = jnp.zeros(3), jnp.array([1.0, 0.0, 0.0, 0.0])
     for link, angle in zip(links, joint_pos[JOINTS], strict=True):
         pos = pos + rotate(quat, jnp.array(link.pos))

@@ -6,7 +6,8 @@ from collections.abc import Callable
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from envs.hand.hand_file import Effect, HandFile, JointQuantity, Quantity
+from envs.hand.hand_file import Effect, HandFile
+from envs.hand.quantity import JointQuantity, Quantity
 from sysid.mechanism import Mechanism, hand_mechanism
 from sysid.result import Cause, Diagnosis, Estimate
 

@@ -10,23 +10,23 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.config.typed import dump_yaml, from_dict, override, to_dict
 from envs.errors import InputError
 from envs.hand import hand_file
-from envs.hand.figures import figures
 from envs.hand.hand_file import (
     DEFAULT_HAND_FILE,
     Effect,
     HandFile,
-    Quantity,
     load_hand_file,
     save_hand_file,
 )
+from envs.hand.nominal import vendor_hand
+from envs.hand.quantity import Quantity
 
 SEED = 20260102
 HAND = load_hand_file()
-JOINTS = figures().joint_names
+JOINTS = vendor_hand().joint_names
 
 
 def test_masses_are_those_of_the_weighed_hand():
-    links = sum(figures().per_joint("mass"))
+    links = sum(vendor_hand().per_joint("mass"))
     assert HAND.palm_mass.value + links == pytest.approx(0.738, abs=1e-9)
     total = HAND.palm_mass.value + links + HAND.payload_mass.value
     assert total == pytest.approx(0.818, abs=1e-9)
@@ -34,7 +34,7 @@ def test_masses_are_those_of_the_weighed_hand():
 
 def test_payload_lies_on_the_back():
     front = HAND.payload_pos.value[0] + HAND.payload_size.value[0] / 2
-    assert front == pytest.approx(figures().palm.bounds_min[0], abs=1e-9)
+    assert front == pytest.approx(vendor_hand().palm.bounds_min[0], abs=1e-9)
 
 
 def test_damping_keeps_the_nominal_damping_ratio():

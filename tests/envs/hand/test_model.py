@@ -1,12 +1,16 @@
+import json
+from pathlib import Path
+
 import jax.numpy as jnp
 import mujoco
 import numpy as np
 import pytest
 
 from envs.config.typed import override
-from envs.hand.figures import FINGERS, figures, kinematics_checks
+from envs.hand import nominal
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, build_model, build_spec
+from envs.hand.nominal import FINGERS, vendor_hand
 from envs.hand.spec import (
     OTHER_LINKS,
     TIP_LINKS,
@@ -18,7 +22,11 @@ from envs.hand.stance import load_stance
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
-CHECKS = kinematics_checks()
+VENDOR = json.loads(Path(nominal.__file__).with_name("vendor_hand.json").read_text())
+CHECKS = tuple(
+    (np.array(check["qpos"]), np.array(check["fingertip_in_palm"]))
+    for check in VENDOR["forward_kinematics_checks"]
+)
 
 
 def tips_in_palm(qpos):
@@ -62,12 +70,13 @@ def test_every_body_could_exist():
     assert (inertia[:, 2] <= inertia[:, 0] + inertia[:, 1] + 1e-12).all()
 
 
-def test_joints_and_drives_are_those_of_the_figures_and_the_hand_file():
-    joints = figures().joint_names
+def test_joints_and_drives_are_those_of_the_vendor_and_the_hand_file():
+    vendor = vendor_hand()
+    joints = vendor.joint_names
     assert [MODEL.joint(i).name for i in range(1, 21)] == list(joints)
     assert [MODEL.actuator(i).name for i in range(20)] == list(joints)
-    np.testing.assert_allclose(MODEL.jnt_range[1:], figures().per_joint("range_rad"))
-    kp, kv, limit = (figures().per_joint(k) for k in ("kp", "kv", "force_limit"))
+    np.testing.assert_allclose(MODEL.jnt_range[1:], vendor.per_joint("range_rad"))
+    kp, kv, limit = (vendor_hand().per_joint(k) for k in ("kp", "kv", "force_limit"))
     np.testing.assert_allclose(MODEL.actuator_gainprm[:, 0], 18.7 * kp)
     np.testing.assert_allclose(MODEL.actuator_biasprm[:, 1], -18.7 * kp)
     np.testing.assert_allclose(MODEL.actuator_biasprm[:, 2], -np.sqrt(18.7) * kv)
@@ -138,7 +147,7 @@ def test_fingers_can_touch_each_other():
     data = mujoco.MjData(MODEL)
     found = set()
     rng = np.random.default_rng(20260115)
-    low, high = figures().per_joint("range_rad").T
+    low, high = vendor_hand().per_joint("range_rad").T
     for _ in range(50):
         data.qpos[:] = [0, 0, 1, 1, 0, 0, 0, *rng.uniform(low, high)]
         mujoco.mj_forward(MODEL, data)
@@ -155,7 +164,7 @@ def test_sensors_are_found_by_name():
     spec = hand_spec(MODEL)
     assert sum(s.stop - s.start for s in spec.sensors.values()) == MODEL.nsensordata
     vector = jnp.arange(float(MODEL.nsensordata))
-    torque = [spec.read(vector, f"torque_{name}") for name in figures().joint_names]
+    torque = [spec.read(vector, f"torque_{name}") for name in vendor_hand().joint_names]
     assert all(len(x) == 1 for x in torque)
     assert len({int(x[0]) for x in torque}) == 20
     with pytest.raises(KeyError):

@@ -7,12 +7,12 @@ import pytest
 from envs.config.typed import override
 from envs.errors import InputError
 from envs.hand import stance as stance_module
-from envs.hand.figures import FINGERS
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, build_model
+from envs.hand.nominal import FINGERS
 from envs.hand.spec import TIP_SITES, TIP_SPHERES
 from envs.hand.stance import load_stance, settle, stance_json, stance_of
-from envs.hand.stance_search import support_margins
+from envs.hand.support import support_margins
 
 HAND = load_hand_file()
 STANCE = load_stance()

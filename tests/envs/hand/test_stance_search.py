@@ -14,8 +14,8 @@ from envs.hand.stance_search import (
     StanceWeights,
     palm_quat,
     search_stance,
-    support_margins,
 )
+from envs.hand.support import support_margins
 
 SEED = 20260116
 HAND = load_hand_file()

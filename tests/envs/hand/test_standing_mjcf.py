@@ -4,8 +4,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.hand.figures import figures
 from envs.hand.hand_file import DEFAULT_HAND_FILE
+from envs.hand.nominal import vendor_hand
 from envs.hand.stance import load_stance
 from fingers_mjx.cli.main import main
 from fingers_robot.simulator.hand import SimulatedHand
@@ -19,7 +19,7 @@ def model(tmp_path_factory):
 
 
 def test_the_simulated_hand_reads_it_and_stands(model):
-    hand = SimulatedHand(model, figures().joint_names)
+    hand = SimulatedHand(model, vendor_hand().joint_names)
     hand.set_enabled(True)
     hand.target_rad = np.array(load_stance().target_rad)
     hand.advance(6.0)

@@ -4,9 +4,9 @@ import mujoco
 import pytest
 from support.cli_setup import contents
 
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
+from envs.hand.nominal import vendor_hand
 from fingers_mjx.cli.main import main
 
 
@@ -34,7 +34,7 @@ def test_a_hand_of_ones_own_is_imported_and_stands(here, capsys):
         "wrote my.yaml",
     ]
     hand = load_hand_file(here / "my.yaml")
-    assert hand.nominal.joint_names == figures().joint_names
+    assert hand.nominal.joint_names == vendor_hand().joint_names
     assert main(["hand", "mjcf", "--hand", "my.yaml", "-o", "again.xml"]) == 0
     again = mujoco.MjModel.from_xml_path("again.xml")
     assert again.body_mass.sum() == pytest.approx(0.818, abs=1e-6)

@@ -128,9 +128,9 @@ def test_names_that_do_not_exist():
 
 
 def hand_figures():
-    from envs.hand.figures import figures
+    from envs.hand.nominal import vendor_hand
 
-    return figures().links
+    return vendor_hand().links
 
 
 def test_what_a_plan_shows_follows_from_the_motion(tmp_path):

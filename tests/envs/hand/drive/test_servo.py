@@ -11,9 +11,9 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step
 from envs.errors import InputError
 from envs.hand.drive.servo import CommandPath, ServoDrive, command_step, servo_drive
-from envs.hand.figures import figures
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_model
+from envs.hand.nominal import vendor_hand
 
 DT = 0.005
 SEED = 20260103
@@ -176,7 +176,7 @@ def test_sequence_is_the_repeated_step():
 
 
 def _nominal() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    figure = figures()
+    figure = vendor_hand()
     return tuple(figure.per_joint(name) for name in ("kp", "kv", "force_limit"))
 
 

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.hand.figures import figures
 from envs.hand.importing.load import load_custom_hand
+from envs.hand.nominal import vendor_hand
 
 SEED = 20260104
-JOINTS = figures().joint_names
+JOINTS = vendor_hand().joint_names
 HINGE = '<joint name="{joint}" axis="0 1 0" range="0 90"/>'
 BASE = '<body name="base"><freejoint name="root"/><geom size="0.02" mass="0.3"/>'
 ACTUATOR = '<position name="act_{0}" joint="{0}" kp="1"/>'

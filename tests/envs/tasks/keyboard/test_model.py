@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.keyboard_rig import Rig
 
-from envs.hand.figures import figures
+from envs.hand.nominal import vendor_hand
 from envs.hand.spec import HAND_NQ
 from envs.tasks.keyboard.model import (
     ACTUATION_M,
@@ -86,7 +86,7 @@ def test_a_force_on_a_key_moves_it_as_the_data_sheet_says(rig):
 def test_forward_kinematics_are_those_of_the_model(rig):
     data = mujoco.MjData(rig.model)
     rng = np.random.default_rng(4)
-    low, high = figures().per_joint("range_rad").T
+    low, high = vendor_hand().per_joint("range_rad").T
     for _ in range(10):
         joints = rng.uniform(low, high)
         data.qpos[:7], data.qpos[7:HAND_NQ] = rng.normal(size=7), joints

@@ -8,20 +8,21 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.hand.figures import NAMES, figures
-from envs.hand.hand_file import JointQuantity, hand_yaml, load_hand_file
+from envs.hand.hand_file import hand_yaml, load_hand_file
 from envs.hand.importing.check import TIP_ERROR_M, check_same, tip_error_m
-from envs.hand.importing.figures import import_hand
+from envs.hand.importing.convert import import_hand
 from envs.hand.importing.load import load_custom_hand
 from envs.hand.importing.palm import Frame, rotation
 from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
+from envs.hand.nominal import NAMES, vendor_hand
+from envs.hand.quantity import JointQuantity
 from envs.hand.stance import load_stance, stance_of
 from envs.registry import make_env
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
-JOINTS = figures().joint_names
+JOINTS = vendor_hand().joint_names
 THEIRS = {name: f"right_{name.replace('finger', 'digit')}" for name in JOINTS}
 TURNED = (0.5, 0.5, -0.5, 0.5)
 
@@ -159,8 +160,8 @@ def test_our_own_hand_comes_back(ours):
     settled = stance_of(found.hand)
     assert settled.hand_sha256 != HAND.sha256
     np.testing.assert_allclose(settled.qpos, load_stance().qpos, atol=1e-5)
-    limits = "torque_scale: the default hand's, on the vendor's figures"
-    assert found.told == (limits,)
+    limits = "torque_scale: the default hand's, on the vendor's parameters"
+    assert found.notes == (limits,)
 
 
 def test_other_names_frames_and_meshes_are_the_same_hand(vendor):
@@ -219,7 +220,7 @@ def test_the_frame_of_the_palm_may_be_told(tmp_path):
         import_hand(path)
     quat = tuple(np.array(TURNED) * [1, -1, -1, -1])
     links = import_hand(path, palm_quat=quat).hand.nominal.links
-    wanted = np.array([link.pos for link in figures().links[::4]])
+    wanted = np.array([link.pos for link in vendor_hand().links[::4]])
     wanted[0, 1] += 0.08
     np.testing.assert_allclose([k.pos for k in links[::4]], wanted, atol=1e-6)
 
@@ -239,15 +240,15 @@ def test_what_the_model_lacks_is_the_vendors_and_told(tmp_path):
     tied.type, tied.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
     bare = written(tmp_path / "hand.xml", spec)
     found = import_hand(bare)
-    told = " ".join(found.told)
+    told = " ".join(found.notes)
     named = ["servos", "kv", "torque limits", "armature", "payload", "palm is fixed"]
     named += ["equality constraints", "on finger4_link3"]
     assert [what for what in named if what not in told] == []
     nominal = found.hand.nominal
     for name in ("kp", "kv", "force_limit", "armature"):
-        wanted = figures().per_joint(name)
+        wanted = vendor_hand().per_joint(name)
         np.testing.assert_allclose(nominal.per_joint(name), wanted, rtol=1e-9)
-    assert nominal.links[14].capsule == figures().links[14].capsule
+    assert nominal.links[14].capsule == vendor_hand().links[14].capsule
     assert found.hand.stiffness_scale == HAND.stiffness_scale
     assert found.hand.payload_mass.value == 0.0
     assert found.hand.palm_mass.value == pytest.approx(0.38908 + 0.080, abs=1e-9)
@@ -279,8 +280,8 @@ def test_a_flat_link_keeps_moments_that_a_body_can_have(tmp_path):
 
 
 def test_the_keyboard_task_refuses_it():
-    """Its fingertip is told by the vendor's figures, here and on the robot."""
-    own = dataclasses.replace(HAND, figures=figures())
+    """Its fingertip is computed from the vendor's dimensions, here and on the robot."""
+    own = dataclasses.replace(HAND, figures=vendor_hand())
     with pytest.raises(InputError, match="hand file: figures"):
         make_env("keyboard", hand=own)
 
@@ -308,7 +309,7 @@ FIELDS = [
 
 @pytest.mark.parametrize(("old", "new", "message"), FIELDS)
 def test_malformed_figures_are_named(tmp_path, old, new, message):
-    own = dataclasses.replace(HAND, figures=figures())
+    own = dataclasses.replace(HAND, figures=vendor_hand())
     text = hand_yaml(own)
     assert old in text
     path = tmp_path / "hand.yaml"
@@ -318,7 +319,7 @@ def test_malformed_figures_are_named(tmp_path, old, new, message):
 
 
 def test_figures_survive_the_hand_file_and_count_in_its_digest(tmp_path):
-    own = dataclasses.replace(HAND, figures=figures())
+    own = dataclasses.replace(HAND, figures=vendor_hand())
     path = tmp_path / "hand.yaml"
     path.write_text(hand_yaml(own), encoding="utf-8")
     assert load_hand_file(path) == own

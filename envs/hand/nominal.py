@@ -1,19 +1,20 @@
-"""Figures of a hand: kinematics, inertials, limits and nominal drive.
+"""Nominal parameters of a hand: kinematics, inertials, limits and drive.
 
 Those of the WUJI right hand are the vendor's (WUJI right hand description, release
-2026.04.27, MIT licence) with collision bounds measured on its meshes; `figures.json`
-keeps them in metre, kilogram, radian and newton-metre. A hand file may carry others.
+2026.04.27, MIT licence) with collision bounds measured on its meshes;
+`vendor_hand.json` keeps them in metre, kilogram, radian and newton-metre. A hand file
+may carry others.
 """
 
 import json
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
-from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
-from envs.config.typed import from_dict
+from envs.config.typed import from_dict, limits
 from envs.errors import InputError
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
@@ -29,12 +30,8 @@ Quat = tuple[float, float, float, float]
 Capsule = tuple[Vector, Vector, float]
 
 
-def _limits(unit: str, low: float, high: float) -> dict[str, Any]:
-    return {"unit": unit, "low": low, "high": high}
-
-
-_PLACE, _TURN = _limits("m", -0.5, 0.5), _limits("1", -1.01, 1.01)
-_MASS, _INERTIA = _limits("kg", 1e-6, 5.0), _limits("kg·m²", 1e-13, 1.0)
+_PLACE, _TURN = limits("m", -0.5, 0.5), limits("1", -1.01, 1.01)
+_MASS, _INERTIA = limits("kg", 1e-6, 5.0), limits("kg·m²", 1e-13, 1.0)
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,8 @@ class Link:
         pos, quat: pose in the parent [m, w x y z]; the joint turns about +y.
         range_rad: joint limits.
         armature: reflected rotor inertia [kg·m²].
-        mass, inertial_pos, inertial_quat, diaginertia: inertial figures [kg, m, kg·m²].
+        mass, inertial_pos, inertial_quat, diaginertia: mass, centre of mass, principal
+            axes and moments [kg, m, 1, kg·m²].
         kp, kv: nominal (uncalibrated) position-drive gains [N·m/rad, N·m·s/rad].
         force_limit: nominal drive torque limit [N·m].
         capsule: (from, to, radius) of the collision capsule, or None.
@@ -58,15 +56,15 @@ class Link:
     joint: str
     pos: Vector = field(metadata=_PLACE)
     quat: Quat = field(metadata=_TURN)
-    range_rad: tuple[float, float] = field(metadata=_limits("rad", -6.3, 6.3))
-    armature: float = field(metadata=_limits("kg·m²", 0.0, 1.0))
+    range_rad: tuple[float, float] = field(metadata=limits("rad", -6.3, 6.3))
+    armature: float = field(metadata=limits("kg·m²", 0.0, 1.0))
     mass: float = field(metadata=_MASS)
     inertial_pos: Vector = field(metadata=_PLACE)
     inertial_quat: Quat = field(metadata=_TURN)
     diaginertia: Vector = field(metadata=_INERTIA)
-    kp: float = field(metadata=_limits("N·m/rad", 1e-6, 1e4))
-    kv: float = field(metadata=_limits("N·m·s/rad", 0.0, 1e4))
-    force_limit: float = field(metadata=_limits("N·m", 1e-6, 1e3))
+    kp: float = field(metadata=limits("N·m/rad", 1e-6, 1e4))
+    kv: float = field(metadata=limits("N·m·s/rad", 0.0, 1e4))
+    force_limit: float = field(metadata=limits("N·m", 1e-6, 1e3))
     capsule: Capsule | None = field(default=None, metadata=_PLACE)
     tip: Vector | None = field(default=None, metadata=_PLACE)
 
@@ -75,17 +73,17 @@ class Link:
         _check_inertia(self)
         low, high = self.range_rad
         if not low < high:
-            raise InputError("figures", "range_rad", self.range_rad, "low below high")
+            raise InputError("hand", "range_rad", self.range_rad, "low below high")
         if self.capsule:
             start, end, radius = self.capsule
             if radius < 1e-4 or np.linalg.norm(np.subtract(end, start)) < 1e-4:
                 valid = "two ends and a radius, 0.1 mm or more apart and thick"
-                raise InputError("figures", "capsule", self.capsule, valid)
+                raise InputError("hand", "capsule", self.capsule, valid)
 
 
 @dataclass(frozen=True)
 class Palm:
-    """The palm: inertial figures and the bounds of its mesh [kg, m, kg·m²]."""
+    """The palm: inertial parameters and the bounds of its mesh [kg, m, kg·m²]."""
 
     mass: float = field(metadata=_MASS)
     inertial_pos: Vector = field(metadata=_PLACE)
@@ -98,13 +96,13 @@ class Palm:
         _check_inertia(self)
         if not np.all(np.subtract(self.bounds_max, self.bounds_min) > 1e-4):
             valid = f"each above that of bounds_min, {list(self.bounds_min)}"
-            raise InputError("figures", "bounds_max", list(self.bounds_max), valid)
+            raise InputError("hand", "bounds_max", list(self.bounds_max), valid)
 
 
 def _check_unit(name: str, quat: Quat) -> None:
     if abs(np.linalg.norm(quat) - 1.0) > 1e-3:
         valid = "w x y z of length 1"
-        raise InputError("figures", name, list(quat), valid)
+        raise InputError("hand", name, list(quat), valid)
 
 
 def _check_inertia(part: Link | Palm) -> None:
@@ -114,11 +112,11 @@ def _check_inertia(part: Link | Palm) -> None:
     # Of a plate they are equal, which rounding could break where the palm is scaled.
     if most > (least + middle) * (1.0 - 1e-12):
         valid = "moments of which each is less than the other two together"
-        raise InputError("figures", "diaginertia", list(part.diaginertia), valid)
+        raise InputError("hand", "diaginertia", list(part.diaginertia), valid)
 
 
 @dataclass(frozen=True)
-class Figures:
+class NominalHand:
     """The whole hand; `links` is finger-major, proximal to distal (5 × 4).
 
     The first link of a finger has no capsule, only the last one a tip.
@@ -131,22 +129,29 @@ class Figures:
         found = tuple((link.body, link.joint) for link in self.links)
         if found != NAMES:
             wrong = next((f for f, n in zip(found, NAMES, strict=False) if f != n), "")
-            told = " ".join(wrong) or f"{len(found)} links"
+            names = " ".join(wrong) or f"{len(found)} links"
             valid = "20 links finger1_link1 to finger5_link4 with such joints, in order"
-            raise InputError("figures", "links", told, valid)
+            raise InputError("hand", "links", names, valid)
         for index, link in enumerate(self.links):
             shape = (link.capsule is not None, link.tip is not None)
             if shape != (index % 4 > 0, index % 4 == 3):
                 valid = "a capsule on links 2 to 4 of a finger, a tip on link 4 alone"
-                raise InputError("figures", f"links.{index}", link.body, valid)
+                raise InputError("hand", f"links.{index}", link.body, valid)
 
     @property
     def joint_names(self) -> tuple[str, ...]:
         """Names of the 20 joints in the order used everywhere."""
         return tuple(link.joint for link in self.links)
 
-    def per_joint(self, field: str) -> np.ndarray:
-        """One figure of all 20 links as an array, e.g. `per_joint("kp")`."""
+    def per_joint(self, field: str) -> Float[np.ndarray, "20 ..."]:
+        """A parameter of all links, x_j, j = 1 … 20, as `per_joint("kp")` [N·m/rad].
+
+        Args:
+            field: of `Link`, which states its unit [rad, kg, kg·m², N·m, …].
+
+        Source:
+            WUJI right hand description 2026.04.27, or the hand file.
+        """
         return np.array([getattr(link, field) for link in self.links])
 
 
@@ -162,32 +167,26 @@ def _link(raw: dict) -> Link:
         data["capsule"] = [ends[:3], ends[3:], capsule["radius"]]
     if "fingertip" in raw:
         data["tip"] = raw["fingertip"]["pos"]
-    return from_dict(Link, data, "figures.json", raw["body"])
+    return from_dict(Link, data, "vendor_hand.json", raw["body"])
 
 
 def _palm(raw: dict) -> Palm:
     bounds = {f"bounds_{end}": raw["mesh_bounds"][end] for end in ("min", "max")}
     rest = {name: value for name, value in raw.items() if name != "mesh_bounds"}
-    return from_dict(Palm, rest | bounds, "figures.json", "palm")
+    return from_dict(Palm, rest | bounds, "vendor_hand.json", "palm")
 
 
 @cache
 def _raw() -> dict:
-    return json.loads(files("envs.hand").joinpath("figures.json").read_text("utf-8"))
-
-
-@cache
-def figures() -> Figures:
-    """Reads the vendor's hand from `figures.json` beside this file."""
-    return Figures(
-        palm=_palm(_raw()["palm"]),
-        links=tuple(_link(link) for f in _raw()["fingers"] for link in f["links"]),
+    return json.loads(
+        files("envs.hand").joinpath("vendor_hand.json").read_text("utf-8")
     )
 
 
-def kinematics_checks() -> tuple[tuple[np.ndarray, np.ndarray], ...]:
-    """The vendor's check poses: angles [rad] (20), tips in the palm [m] (5 × 3)."""
-    return tuple(
-        (np.array(c["qpos"]), np.array(c["fingertip_in_palm"]))
-        for c in _raw()["forward_kinematics_checks"]
+@cache
+def vendor_hand() -> NominalHand:
+    """Reads the vendor's hand from `vendor_hand.json` beside this file."""
+    return NominalHand(
+        palm=_palm(_raw()["palm"]),
+        links=tuple(_link(link) for f in _raw()["fingers"] for link in f["links"]),
     )

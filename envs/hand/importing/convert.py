@@ -2,7 +2,7 @@
 
 Kinematics, inertia, limits and drive are the model's numbers in our frames; collision
 shapes are capsules and a box fitted to its colliding geoms. What the model lacks is
-taken from the vendor's figures and told. In the end both models must put the
+taken from the vendor's hand and noted. In the end both models must put the
 fingertips at the same places and weigh the same.
 """
 
@@ -16,16 +16,9 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.figures import NAMES, Capsule, Figures, Link, Palm, figures
-from envs.hand.hand_file import (
-    HandFile,
-    JointQuantity,
-    Quantity,
-    Vector,
-    load_hand_file,
-)
+from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.importing.check import check_same
-from envs.hand.importing.drive import Drive, drive_of
+from envs.hand.importing.drive import ImportedDrive, drive_of
 from envs.hand.importing.inertia import (
     PALM_GROUP,
     PAYLOAD_GROUP,
@@ -39,8 +32,11 @@ from envs.hand.importing.shape import (
     bounds,
     colliding_geoms,
     link_capsule,
+    rounded,
     surface_points,
 )
+from envs.hand.nominal import NAMES, Capsule, Link, NominalHand, Palm, vendor_hand
+from envs.hand.quantity import JointQuantity, Quantity, Vector
 
 COMPILE_CPU_S = 60
 _SCALES = {
@@ -56,12 +52,12 @@ class ImportedHand:
     """A user's hand as a hand file.
 
     Attributes:
-        hand: the hand file, with figures of its own.
-        told: sentences that say what the model lacked and what took its place.
+        hand: the hand file, with nominal parameters of its own.
+        notes: sentences that say what the model lacked and what took its place.
     """
 
     hand: HandFile
-    told: tuple[str, ...]
+    notes: tuple[str, ...]
 
 
 def import_hand(
@@ -78,7 +74,7 @@ def import_hand(
             follow from the finger bases.
 
     Returns:
-        The hand file: the default one in what an MJCF does not tell (delay, filter,
+        The hand file: the default one in what an MJCF does not hold (delay, filter,
         speed, friction).
 
     Raises:
@@ -89,24 +85,24 @@ def import_hand(
     placed = place(custom, palm_quat)
     actuators = [placed.model.actuator(name).id for name in custom.actuators]
     drive = drive_of(placed.model, placed.joints, actuators)
-    shapes, told_shapes = _capsules(placed)
-    palm, told_palm = _palm(placed)
+    shapes, shape_notes = _capsules(placed)
+    palm, palm_notes = _palm(placed)
     links = tuple(
         _link(placed, index, drive, shapes[index]) for index in range(len(NAMES))
     )
-    hand, told_hand = _hand_file(placed, Figures(palm, links), drive)
+    hand, hand_notes = _hand_file(placed, NominalHand(palm, links), drive)
     check_same(placed, hand)
-    told = (*custom.defaults, *drive.told, *told_shapes, *told_palm, *told_hand)
+    notes = (*custom.defaults, *drive.notes, *shape_notes, *palm_notes, *hand_notes)
     if placed.model.neq or placed.model.ntendon:
-        told += ("equality constraints and tendons are left out",)
-    return ImportedHand(hand, told)
+        notes += ("equality constraints and tendons are left out",)
+    return ImportedHand(hand, notes)
 
 
 def _capsules(placed: Placed) -> tuple[list[Capsule | None], tuple[str, ...]]:
     """Capsules of links 2 to 4 of each finger; the vendor's where no geom collides."""
     found: list[Capsule | None] = []
     lacking = []
-    for index, vendor in enumerate(figures().links):
+    for index, vendor in enumerate(vendor_hand().links):
         geoms = colliding_geoms(placed.model, placed.bodies[index])
         if vendor.capsule is None:
             found.append(None)
@@ -117,15 +113,15 @@ def _capsules(placed: Placed) -> tuple[list[Capsule | None], tuple[str, ...]]:
             found.append(vendor.capsule)
             body = placed.bodies[index][0]
             lacking.append(placed.model.body(body).name)
-    told = f"no colliding geom on {', '.join(lacking)}: the vendor's capsules"
-    return found, (told,) * bool(lacking)
+    note = f"no colliding geom on {', '.join(lacking)}: the vendor's capsules"
+    return found, (note,) * bool(lacking)
 
 
 def _palm(placed: Placed) -> tuple[Palm, tuple[str, ...]]:
     bodies = placed.bodies[PALM_GROUP]
     inertia = _inertia(placed, bodies, placed.palm_w, "palm")
     geoms = colliding_geoms(placed.model, bodies)
-    low, high = figures().palm.bounds_min, figures().palm.bounds_max
+    low, high = vendor_hand().palm.bounds_min, vendor_hand().palm.bounds_max
     if geoms:
         points = surface_points(placed.model, placed.data, geoms, placed.palm_w)
         low, high = bounds(points)
@@ -135,14 +131,16 @@ def _palm(placed: Placed) -> tuple[Palm, tuple[str, ...]]:
     return palm, ("no colliding geom on the palm: the vendor's bounds",) * (not geoms)
 
 
-def _link(placed: Placed, index: int, drive: Drive, capsule: Capsule | None) -> Link:
+def _link(
+    placed: Placed, index: int, drive: ImportedDrive, capsule: Capsule | None
+) -> Link:
     body, joint = NAMES[index]
     frame = placed.links[index]
     if index % 4:
         frame = placed.links[index - 1].inverse.of(frame)
     inertia = _inertia(placed, placed.bodies[index], placed.link_w(index), body)
-    figure: dict[str, Any] = {
-        name: _short(values[index]) for name, values in drive.figures.items()
+    drives: dict[str, Any] = {
+        name: rounded(values[index]) for name, values in drive.values.items()
     }
     return Link(
         body=body,
@@ -153,21 +151,21 @@ def _link(placed: Placed, index: int, drive: Drive, capsule: Capsule | None) -> 
         capsule=capsule,
         tip=capsule[1] if capsule and index % 4 == 3 else None,
         **_inertial(inertia),
-        **figure,
+        **drives,
     )
 
 
 def _inertia(placed: Placed, bodies: list[int], frame: Frame, name: str) -> Inertia:
     found = inertia_of(placed.model, placed.data, bodies, frame)
     if not (found.mass > 0 and found.diagonal.min() > 0):
-        told = f"{name} with mass {found.mass:g} kg, inertia {found.diagonal}"
-        raise InputError(placed.custom.path, "", told, "mass and inertia above 0")
+        weak = f"{name} with mass {found.mass:g} kg, inertia {found.diagonal}"
+        raise InputError(placed.custom.path, "", weak, "mass and inertia above 0")
     return found
 
 
 def _inertial(inertia: Inertia) -> dict[str, Any]:
     return {
-        "mass": _short(inertia.mass),
+        "mass": rounded(inertia.mass),
         "inertial_pos": _rounded(inertia.pos),
         "inertial_quat": _rounded(inertia.quat),
         "diaginertia": _rounded(inertia.diagonal),
@@ -175,18 +173,18 @@ def _inertial(inertia: Inertia) -> dict[str, Any]:
 
 
 def _hand_file(
-    placed: Placed, own: Figures, drive: Drive
+    placed: Placed, own: NominalHand, drive: ImportedDrive
 ) -> tuple[HandFile, tuple[str, ...]]:
-    """The default hand file with what the model tells in the place of its own."""
+    """The default hand file with what the model holds in the place of its own."""
     default, note = load_hand_file(), f"of {placed.custom.path.name}"
     scales = {
         _SCALES[name]: JointQuantity(1.0, "1", "user", note=f"{name} is that {note}")
         for name in drive.own & set(_SCALES)
     }
     kept = [field for name, field in _SCALES.items() if name not in drive.own]
-    payload, told = _payload(placed, own, note)
+    payload, notes = _payload(placed, own, note)
     if kept:
-        told += (f"{', '.join(kept)}: the default hand's, on the vendor's figures",)
+        notes += (f"{', '.join(kept)}: the default hand's, on the vendor's parameters",)
     hand = dataclasses.replace(
         default,
         name=f"hand {note}",
@@ -196,12 +194,14 @@ def _hand_file(
         **payload,
         **scales,
     )
-    return hand, told
+    return hand, notes
 
 
-def _payload(placed: Placed, own: Figures, note: str) -> tuple[dict, tuple[str, ...]]:
+def _payload(
+    placed: Placed, own: NominalHand, note: str
+) -> tuple[dict, tuple[str, ...]]:
     """The module on the back: mass, centre and box; a speck inside without one."""
-    bodies, told = placed.bodies[PAYLOAD_GROUP], ()
+    bodies, notes = placed.bodies[PAYLOAD_GROUP], ()
     mass, pos = 0.0, np.array(own.palm.inertial_pos)
     size = np.full(3, _NO_PAYLOAD_M)
     if bodies:
@@ -211,17 +211,13 @@ def _payload(placed: Placed, own: Figures, note: str) -> tuple[dict, tuple[str, 
             points = surface_points(placed.model, placed.data, geoms, placed.palm_w)
             size = np.ptp(points, axis=0)
     else:
-        told = ("no body named payload: nothing is carried on the back",)
+        notes = ("no body named payload: nothing is carried on the back",)
     return {
-        "payload_mass": Quantity(_short(mass), "kg", "user", note=note),
+        "payload_mass": Quantity(rounded(mass), "kg", "user", note=note),
         "payload_pos": Vector(_rounded(pos), "m", "user", note=note),
         "payload_size": Vector(_rounded(size), "m", "user", note=note),
-    }, told
-
-
-def _short(value: float) -> float:
-    return float(f"{value:.12g}")
+    }, notes
 
 
 def _rounded(values: Float[np.ndarray, " n"] | tuple[float, ...]) -> tuple:
-    return tuple(_short(value) for value in values)
+    return tuple(rounded(value) for value in values)
