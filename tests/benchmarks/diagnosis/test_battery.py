@@ -50,12 +50,12 @@ def test_figures_of_a_right_and_of_a_wrong_diagnosis():
 
 
 def test_what_moves_the_same_counts_as_right_if_it_was_named():
-    same = row(effects=("mount_tilt",), causes=("encoder_offset",))
+    alone = row(effects=("mount_tilt",), causes=("encoder_offset",))
     named = row(
         effects=("mount_tilt",), causes=("encoder_offset",), rivals=("mount_tilt",)
     )
     other = row(effects=("deadband",), causes=("backlash",), rivals=("deadband",))
-    assert [r.right for r in (same, named, other)] == [False, True, False]
+    assert [r.right for r in (alone, named, other)] == [False, True, False]
     same = "first or the same, medium"
     assert figures([named])[same]["rate"] == 1.0
     assert figures([named])["first medium"]["rate"] == 0.0
