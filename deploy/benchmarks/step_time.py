@@ -19,7 +19,8 @@ from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_deploy.rotations import conjugate, gravity
-from fingers_robot.reading import ImuReading, Reading, sound_health
+from fingers_robot.drivers.stand_in import sound_health
+from fingers_robot.reading import ImuReading, Reading
 from fingers_robot.runtime.realtime import resident_mb
 from fingers_robot.safety import (
     Inputs,

@@ -2,7 +2,7 @@
 
     python deploy/benchmarks/task_runs.py --trials 10
 
-Everything is the shim's own code, as in `fault_lab`; the scenes are those of training;
+Everything is the shim's own code, as in `faults.lab`; the scenes are those of training;
 keys are asked for, their events come from the scene; a camera's samples go through the
 socket, 60 of them a second and 40 ms late. Pushing is tried as it is, and with the rows
 on effort and tracking (S5, S8b) off. A hand that has fallen is armed for recovery in

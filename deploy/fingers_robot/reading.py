@@ -63,34 +63,6 @@ class Health:
     pos_rad: Array
 
 
-def sound_health(
-    t_s: float,
-    enabled: bool,
-    pos_rad: Array,
-    temperature_c: Array | float = 40.0,
-    bus_v: float = 14.8,
-) -> Health:
-    """A read-back without a fault, of a hand that is not real: effort limits at 1 A.
-
-    Args:
-        t_s: when it began [s].
-        enabled: all joints are energized, else none.
-        pos_rad: joint angles [rad], [20].
-        temperature_c: joint temperatures [°C], [20] or one for all.
-        bus_v: supply voltage [V].
-    """
-    return Health(
-        t_s=t_s,
-        enabled=enabled,
-        disabled=not enabled,
-        temperature_c=np.broadcast_to(np.asarray(temperature_c, float), pos_rad.shape),
-        bus_v=bus_v,
-        error_code=np.zeros(pos_rad.shape, np.uint32),
-        effort_limit_a=np.ones(pos_rad.shape),
-        pos_rad=pos_rad,
-    )
-
-
 @dataclass(frozen=True, slots=True)
 class DriverInfo:
     """What does not change while a driver is open.

@@ -13,6 +13,7 @@ from fingers_deploy.policy import Runtime
 from fingers_robot.behaviour.command import DEADZONE, FixedCommand, Ranges
 from fingers_robot.behaviour.exchange import Answer, Query
 from fingers_robot.behaviour.policies import Policies
+from fingers_robot.behaviour.sources import Sources
 from fingers_robot.safety import PolicyFault
 
 
@@ -49,7 +50,7 @@ class Behaviours:
 
     def reset(self, target_rad: Float[np.ndarray, "20"] | tuple[float, ...]) -> None:
         """Starts an episode with the joint targets `target_rad` [rad] on the wire."""
-        self._policies = Policies(self._controllers, self._source)
+        self._policies = Policies(self._controllers, Sources(self._source))
         self.target_rad = np.asarray(target_rad, float)
         self.tick = -1
         self._ask(np.zeros(20), np.array([0.0, 0.0, -1.0]), np.zeros(3), False)

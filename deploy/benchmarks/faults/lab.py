@@ -15,7 +15,9 @@ from fingers_deploy.controller import PolicyController
 from fingers_robot.behaviour.command import FixedCommand
 from fingers_robot.behaviour.exchange import Answer, Query
 from fingers_robot.behaviour.policies import Policies
-from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading, sound_health
+from fingers_robot.behaviour.sources import Sources
+from fingers_robot.drivers.stand_in import sound_health
+from fingers_robot.reading import DriverInfo, Health, ImuReading, Reading
 from fingers_robot.runtime.core import Core
 from fingers_robot.runtime.ticker import Tick
 from fingers_robot.safety import Mode, Operator, make_limits
@@ -170,7 +172,8 @@ class Lab:
         self.driver = LabDriver(hand, bundles[0], self.clock)
         controllers = tuple(PolicyController(b, "numpy") for b in bundles)
         self.source = FixedCommand(sticks)
-        self.link = LabLink(Policies(controllers, self.source), self.clock)
+        policies = Policies(controllers, Sources(self.source))
+        self.link = LabLink(policies, self.clock)
         each = tuple(
             make_limits(b.manifest, hand.joint_limits_rad, **limits) for b in bundles
         )

@@ -17,15 +17,11 @@ from numpy.typing import NDArray
 from fingers_deploy.controller import PolicyController
 from fingers_deploy.manifest import Interface
 from fingers_deploy.rotations import gravity
-from fingers_robot.behaviour.command import CommandSource
 from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
 from fingers_robot.behaviour.hand_over import Moment, asked_for, build_history
-from fingers_robot.behaviour.heading import HeadingConfig
-from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.settle import Ramp, settle_ramp
 from fingers_robot.behaviour.sources import Sources, SourceSample
 from fingers_robot.behaviour.task_inputs import inputs_of
-from fingers_robot.behaviour.tracker_port import TrackerPort
 from fingers_robot.behaviour.upright import tilt_angle, upright_step
 from fingers_robot.reading import Array
 from fingers_robot.safety.types import PolicyFault
@@ -42,22 +38,11 @@ class Policies:
 
     Args:
         controllers: the policies; the first is the one to which recovery leads.
-        source: of the command.
-        heading_hold: gains, for policies whose command has a yaw rate; None: off.
-        keys: requests, for policies that press keys.
-        tracker: camera, for policies that push an object.
+        sources: of commands, keys and camera samples.
     """
 
-    def __init__(
-        self,
-        controllers: tuple[PolicyController, ...],
-        source: CommandSource,
-        heading_hold: HeadingConfig | None = None,
-        keys: KeyRunner | None = None,
-        tracker: TrackerPort | None = None,
-    ):
-        self._controllers = controllers
-        self.sources = Sources(source, heading_hold, keys, tracker)
+    def __init__(self, controllers: tuple[PolicyController, ...], sources: Sources):
+        self._controllers, self.sources = controllers, sources
         longest = max(
             term.history
             for c in controllers

@@ -73,14 +73,10 @@ def add_record(commands: Any) -> None:
     parser.set_defaults(
         command=run,
         runtime="numpy",
-        joystick=None,
         joystick_quiet=QUIET_S,
         sticks=[],
-        heading_hold=None,
-        keys=None,
-        keyboard=None,
-        tracker=None,
         with_sources=False,
+        **dict.fromkeys(("joystick", "heading_hold", "keys", "keyboard", "tracker")),
     )
 
 

@@ -11,14 +11,8 @@ import numpy as np
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Interface
-from fingers_robot.reading import (
-    Array,
-    DriverInfo,
-    Health,
-    ImuReading,
-    Reading,
-    sound_health,
-)
+from fingers_robot.drivers.stand_in import info_of, sound_health
+from fingers_robot.reading import Array, Health, ImuReading, Reading
 from fingers_robot.record.log import Log
 
 
@@ -44,13 +38,7 @@ class ReplayDriver:
         self._times = (log.rows["t"] - log.rows["t"][0]).tolist()
         self._start_s = clock()
         self._enabled = False
-        self.info = DriverInfo(
-            name=f"replay of {log.source}",
-            joint_names=log.joint_names,
-            joint_limits_rad=np.asarray(interface.joint_limits_rad, np.float64),
-            lowpass_hz=interface.command_path.lowpass_hz,
-            live=False,
-        )
+        self.info = info_of(interface, f"replay of {log.source}", live=False)
 
     @property
     def over(self) -> bool:

@@ -13,14 +13,8 @@ import numpy as np
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Interface
 from fingers_robot.drivers.sim_packets import STATE, Ask, request
-from fingers_robot.reading import (
-    Array,
-    DriverInfo,
-    Health,
-    ImuReading,
-    Reading,
-    sound_health,
-)
+from fingers_robot.drivers.stand_in import info_of, sound_health
+from fingers_robot.reading import Array, Health, ImuReading, Reading
 from fingers_robot.waiting import waiting
 
 _START_S, _ANSWER_S = 30.0, 2.0
@@ -43,12 +37,7 @@ class SimDriver:
         self._socket.setblocking(False)
         self.over = False
         self._state: np.void | None = None
-        self.info = DriverInfo(
-            name=f"simulated hand at {path}",
-            joint_names=interface.joint_names,
-            joint_limits_rad=np.asarray(interface.joint_limits_rad, np.float64),
-            lowpass_hz=interface.command_path.lowpass_hz,
-        )
+        self.info = info_of(interface, f"simulated hand at {path}")
 
     @property
     def state(self) -> np.void | None:

@@ -18,6 +18,7 @@ from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.keyboard import Keyboard
 from fingers_robot.behaviour.plan import Plan, read_plan
 from fingers_robot.behaviour.policies import Policies
+from fingers_robot.behaviour.sources import Sources
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, reads
 from fingers_robot.behaviour.tracker_port import TrackerPort
 from fingers_robot.runtime.link import PolicyEnd
@@ -61,7 +62,8 @@ def make_policies(options: Mapping[str, Any]) -> Policies | Plan:
         config = HeadingConfig(hold["gain"], hold["offset_rad_s"], low, high)
     device = options.get("keyboard")
     keys = KeyRunner(tuple(options.get("keys") or ()), device and Keyboard(device))
-    return Policies(controllers, source, config, keys, _tracker(options, interfaces))
+    tracker = _tracker(options, interfaces)
+    return Policies(controllers, Sources(source, config, keys, tracker))
 
 
 def _tracker(

@@ -17,6 +17,7 @@ from fingers_robot.behaviour.hand_over import (
 )
 from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.policies import Policies
+from fingers_robot.behaviour.sources import Sources
 from fingers_robot.safety import PolicyFault
 
 SEED = 17
@@ -38,7 +39,7 @@ class Runner:
 
     def __init__(self, bundles, sticks=(1.0, 0.5, -0.5), tasks=None, hold=None):
         controllers = tuple(PolicyController(b, "numpy") for b in bundles)
-        self.policies = Policies(controllers, FixedCommand(sticks), hold)
+        self.policies = Policies(controllers, Sources(FixedCommand(sticks), hold))
         self.interface = bundles[0].manifest.interface
         self.rng = np.random.default_rng(SEED)
         self.target = np.asarray(self.interface.initial_target_rad, np.float64)

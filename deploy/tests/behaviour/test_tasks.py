@@ -17,6 +17,7 @@ from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.key_runner import KeyRunner
 from fingers_robot.behaviour.keys import ARROWS
 from fingers_robot.behaviour.policies import STAND_S, Policies
+from fingers_robot.behaviour.sources import Sources
 from fingers_robot.behaviour.tracker_port import TrackerPort
 
 INPUTS = {
@@ -80,7 +81,7 @@ class Run:
         chosen = [bundles[name] for name in names]
         controllers = tuple(PolicyController(b, "numpy") for b in chosen)
         self.operator = sources.pop("operator", None) or Operator()
-        self.policies = Policies(controllers, self.operator, **sources)
+        self.policies = Policies(controllers, Sources(self.operator, **sources))
         self.interface = chosen[0].manifest.interface
         self.target = np.asarray(self.interface.initial_target_rad, np.float64)
         self.pos, self.k = self.target.copy(), 0
@@ -311,7 +312,6 @@ def test_heading_hold_stays_within_what_the_policy_knows(bundles):
 
 
 def test_a_fixed_command_holds_the_dead_man(bundles):
-    policies = Policies(
-        (PolicyController(bundles["crawl"], "numpy"),), FixedCommand((1.0,))
-    )
+    controllers = (PolicyController(bundles["crawl"], "numpy"),)
+    policies = Policies(controllers, Sources(FixedCommand((1.0,))))
     assert policies.finish() == ()
