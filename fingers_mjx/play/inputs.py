@@ -12,7 +12,7 @@ from envs.observations import Sample
 from envs.tasks.push.camera import read_camera
 from envs.tasks.push.scene import HALF_M
 from envs.tasks.push.task import PushMemory
-from fingers_deploy.tracking import Frame, ObjectTracker
+from fingers_robot.behaviour.tracking import Frame, ObjectTracker
 
 
 class PlayInputs:

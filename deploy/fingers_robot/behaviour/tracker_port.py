@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.tracking import Frame, ObjectTracker
+from fingers_robot.behaviour.tracking import Frame, ObjectTracker
 
 _LONGEST = 4096
 _FIELDS = {

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.tracking import Frame, ObjectTracker
 from fingers_robot.behaviour.tracker_port import TrackerPort, read_sample
+from fingers_robot.behaviour.tracking import Frame, ObjectTracker
 
 SAMPLE = {
     "t_s": 3.0,

@@ -1,6 +1,6 @@
 """From camera samples to the pushing policy's inputs, as the deployment shim does it.
 
-`fingers_deploy.tracking` is the same in NumPy; a test compares them.
+`fingers_robot.behaviour.tracking` is the same in NumPy; a test compares them.
 """
 
 import flax.struct

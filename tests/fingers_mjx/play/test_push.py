@@ -8,11 +8,11 @@ import pytest
 from support.cli_setup import TRAIN, make_bundle, random_weights
 
 from fingers_deploy import load_bundle
-from fingers_deploy.tracking import ObjectTracker
 from fingers_mjx.evaluation.source import with_command
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
 from fingers_mjx.runs.setup import make_env, new_setup
+from fingers_robot.behaviour.tracking import ObjectTracker
 
 STEPS = 25
 KEY = jax.random.key(3)
