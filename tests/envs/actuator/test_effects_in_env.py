@@ -53,22 +53,22 @@ def worlds():
     """What happens without effects, and with one effect at a time."""
     env = rig.full_env()
     shown = [{}] + [{name: size_of(name)} for name in rig.IN_HAND]
-    output, told, imu, _, invalid = rig.run(env, rig.candidates(env, shown), motion())
+    output, read, imu, _, invalid = rig.run(env, rig.candidates(env, shown), motion())
     assert not invalid.any()
-    return output.state.qpos, told, imu
+    return output.state.qpos, read, imu
 
 
 @pytest.mark.parametrize("name", rig.IN_HAND)
 def test_the_effect_shows(worlds, name):
-    """In the motion, or in what the sensors tell of the same motion."""
-    qpos, told, imu = worlds
+    """In the motion, or in what the sensors measure of the same motion."""
+    qpos, read, imu = worlds
     i = 1 + rig.IN_HAND.index(name)
     moved = np.max(np.abs(qpos[i] - qpos[0])[:, 7:])
     if name not in TELLS:
         assert moved > 2e-3
         return
     assert moved == 0.0
-    pairs = ((told, 1e-4), (imu.gravity, 1e-3), (imu.angvel, 1e-3))
+    pairs = ((read, 1e-4), (imu.gravity, 1e-3), (imu.angvel, 1e-3))
     assert any(np.max(np.abs(x[i] - x[0])) > size for x, size in pairs)
 
 

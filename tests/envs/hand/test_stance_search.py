@@ -91,7 +91,7 @@ def test_same_seed_same_result(problem, stored, found):
     assert not np.array_equal(starts[0], starts[2])
 
 
-def test_search_without_a_stance_is_told(monkeypatch):
+def test_search_without_a_stance_is_an_error(monkeypatch):
     def nothing(self, start):
         return type("Result", (), {"x": start, "fun": 0.0})
 

@@ -16,7 +16,7 @@ def diverge():
 
 
 @pytest.fixture
-def loud():
+def default_log():
     """MuJoCo as it is by default."""
     config = mujoco.MjLogConfig.get()
     config.logto_console = config.logto_file = True
@@ -35,7 +35,7 @@ def test_a_diverged_world_leaves_no_file_and_prints_nothing(
     assert capfd.readouterr() == ("", "")
 
 
-def test_by_default_it_would(tmp_path, monkeypatch, capfd, loud):
+def test_by_default_it_would(tmp_path, monkeypatch, capfd, default_log):
     """Negative control."""
     monkeypatch.chdir(tmp_path)
     diverge()

@@ -90,7 +90,7 @@ def test_coulomb_friction_stops_a_free_joint_after_i_v_over_f():
 
 
 def test_the_zone_of_friction_shrinks_with_the_gain_and_a_deadband_does_not():
-    """The experiment that the catalogue names to tell the two apart."""
+    """The experiment that the catalogue names to distinguish the two."""
     effects = {
         "coulomb_friction": {"torque_nm": 0.04},
         "deadband": {"half_width_rad": 0.02},
@@ -229,9 +229,9 @@ def test_eccentric_encoder_tells_the_speed_of_its_angle():
     params = {"sine_rad": 0.05, "cosine_rad": -0.03}
     _, _, x = rig.run({"encoder_eccentricity": params}, 5.0 * swing())
     found = np.diff(x.encoder) / rig.DT
-    told = x.encoder_speed[1:]
-    assert found == pytest.approx(told, abs=0.03)
-    assert np.max(np.abs(np.diff(x.q) / rig.DT - told)) > 0.1
+    measured = x.encoder_speed[1:]
+    assert found == pytest.approx(measured, abs=0.03)
+    assert np.max(np.abs(np.diff(x.q) / rig.DT - measured)) > 0.1
 
 
 GAP = {"backlash": {"gap_rad": 0.02}, "viscous_friction": {"damping_nms": 0.02}}

@@ -205,7 +205,7 @@ def with_link(hand, index, **changes):
     return dataclasses.replace(hand, figures=own)
 
 
-def test_the_frame_of_the_palm_may_be_told(tmp_path):
+def test_the_frame_of_the_palm_may_be_given(tmp_path):
     """A thumb 80 mm off: the finger bases fit in no frame, so it is asked for."""
     spec = build_spec(HAND)
     turn = rotation(np.array(TURNED)).T
@@ -225,7 +225,7 @@ def test_the_frame_of_the_palm_may_be_told(tmp_path):
     np.testing.assert_allclose([k.pos for k in links[::4]], wanted, atol=1e-6)
 
 
-def test_what_the_model_lacks_is_the_vendors_and_told(tmp_path):
+def test_what_the_model_lacks_is_the_vendors_and_noted(tmp_path):
     spec = build_spec(HAND)
     for group in (spec.sensors, spec.excludes, spec.actuators):
         for item in list(group):
@@ -240,10 +240,10 @@ def test_what_the_model_lacks_is_the_vendors_and_told(tmp_path):
     tied.type, tied.objtype = mujoco.mjtEq.mjEQ_JOINT, mujoco.mjtObj.mjOBJ_JOINT
     bare = written(tmp_path / "hand.xml", spec)
     found = import_hand(bare)
-    told = " ".join(found.notes)
+    notes = " ".join(found.notes)
     named = ["servos", "kv", "torque limits", "armature", "payload", "palm is fixed"]
     named += ["equality constraints", "on finger4_link3"]
-    assert [what for what in named if what not in told] == []
+    assert [what for what in named if what not in notes] == []
     nominal = found.hand.nominal
     for name in ("kp", "kv", "force_limit", "armature"):
         wanted = vendor_hand().per_joint(name)
