@@ -25,7 +25,8 @@ class Cause:
         effect: name in the catalogue.
         where: a joint, or `flexion`, `abduction`, `pip`, `dip`, a finger, `all`.
         parameters: estimates by parameter name.
-        evidence: log-likelihood gain on held-out data [nat].
+        evidence: log-likelihood gain on held-out data, natural logarithm; see
+            docs/reference/diagnosis.md.
         other: the joint that pulls a coupled one; "" for all other effects.
     """
 
@@ -38,11 +39,11 @@ class Cause:
 
 @dataclass(frozen=True)
 class Alternative:
-    """Another explanation instead of a cause.
+    """An effect that could stand in the place of a cause.
 
     Attributes:
         effect: name in the catalogue.
-        score_gap: how much worse it predicts held-out data [nat].
+        score_gap: by how much its log-likelihood gain is smaller.
         distinguishable: whether these records distinguish it from the cause.
         cause: in whose place it would be; "" where there is one cause only.
     """
@@ -80,11 +81,11 @@ class Diagnosis:
 
     Attributes:
         verdict: `none` nothing significant; `found` causes by name; `ambiguous` one of
-            several that these records cannot distinguish; `unexplained` something that
+            several that these records do not distinguish; `unexplained` something that
             no effect of the catalogue explains; `not_observable` the records excite
             too little to say.
         causes: in order of gain.
-        alternatives: of the first cause, nearest first.
+        alternatives: effects in the place of the first cause, nearest first.
         gain: on held-out data; None without causes.
         residual_gains: the same for each residual: `position`, `controller`,
             `mechanics`.
@@ -92,7 +93,7 @@ class Diagnosis:
         not_observable: effects that these records could not show at a size that
             matters.
         unexplained: where an error remains that no effect explains.
-        warnings: bounds met, poor excitation, doubtful data.
+        warnings: bounds met, poor excitation, unreliable data.
         summary: the verdict in words.
         log_sha256: digests of the records.
         seed: of everything random.

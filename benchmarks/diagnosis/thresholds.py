@@ -18,7 +18,7 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import draw_case
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.candidate import fit_models, gain_nat
+from sysid.diagnosis.search.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.search.search import settled
 from sysid.diagnosis.search.stage import extended
 
@@ -34,12 +34,12 @@ def largest_gains(seed: int) -> dict:
     stage = extended(problem, base)
     again = fit_models(problem, [()] * 3, [m.fit.theta for m in stage[:3]])
     base = min([base, *again], key=lambda m: m.fit.cost)
-    samples = int(problem.counts().sum())
+    samples = problem.samples
     best = {"nominal": (0.0, ""), "effect": (0.0, "")}
     for model in stage:
         name = model.effects[-1]
-        kind = "nominal" if problem.space.figured(name) else "effect"
-        best[kind] = max(best[kind], (gain_nat(base, model, samples), name))
+        kind = "nominal" if problem.space.has_nominal(name) else "effect"
+        best[kind] = max(best[kind], (log_likelihood_gain(base, model, samples), name))
     return {"seed": seed, **best, "residual": max(base.errors.tolist())}
 
 

@@ -15,10 +15,10 @@ from fingers_mjx.reports.page import (
     picture,
     write_report,
 )
-from sysid.diagnosis.diagnose import Examined
-from sysid.diagnosis.replay.residuals import sample_rows
-from sysid.diagnosis.replay.track import JointTrack
+from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.search import Examined
 from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Diagnosis
 

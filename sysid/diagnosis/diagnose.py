@@ -11,16 +11,17 @@ import os
 import time
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
 from envs.errors import InputError
-from sysid.diagnosis.replay.track import JointTrack, all_tracks
-from sysid.diagnosis.search.parameters import make_space
+from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.problem import Problem, make_problem
-from sysid.diagnosis.search.search import Search, search
+from sysid.diagnosis.search.search import Examined, search
+from sysid.diagnosis.search.space import make_space
 from sysid.diagnosis.verdict.verdict import verdict_of
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
@@ -28,21 +29,6 @@ from sysid.result import Diagnosis
 
 LEAST_MOTION = 2e-3
 """Least range of a target in which something can be seen [rad or m]."""
-
-
-@dataclass(frozen=True, eq=False)
-class Examined:
-    """What was done with one joint; for reports.
-
-    Attributes:
-        track: its measured motion.
-        problem: residuals and weights; None for a joint that did not move.
-        search: what was found; None likewise.
-    """
-
-    track: JointTrack
-    problem: Problem | None
-    search: Search | None
 
 
 def diagnose(
@@ -53,7 +39,7 @@ def diagnose(
     Args:
         logs: records of the same mechanism; different gains, loads or days in records
             of their own.
-        mechanism: the simulation as it stands.
+        mechanism: the nominal simulation.
         seed: of everything random.
 
     Raises:
@@ -74,15 +60,12 @@ def examine(
         each = partial(_examined, logs=logs, mechanism=mechanism)
         examined = list(joints.map(each, tracks))
     found = verdict_of(examined, mechanism, seed)
-    return (
-        Diagnosis(
-            **found,
-            log_sha256=tuple(log.sha256 for log in logs),
-            seed=seed,
-            runtime_s=round(time.monotonic() - started, 3),
-        ),
-        examined,
+    found = replace(
+        found,
+        log_sha256=tuple(log.sha256 for log in logs),
+        runtime_s=round(time.monotonic() - started, 3),
     )
+    return found, examined
 
 
 def _examined(
@@ -91,7 +74,7 @@ def _examined(
     """Searches one joint, if it moved."""
     seen = [track.track.cmd]
     if mechanism.drives[track.joint].known == "controller":
-        seen.append(track.track.pos)  # pulled by forces that nobody knows
+        seen.append(track.track.pos)  # pulled by unknown forces
     moved = any(np.ptp(np.asarray(x)) > LEAST_MOTION for x in seen)
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
@@ -112,7 +95,7 @@ def problem_of(
     Args:
         track: its measured motion.
         logs: the records.
-        mechanism: the simulation as it stands.
+        mechanism: the nominal simulation.
         company: whether other joints move too.
     """
     drive = mechanism.drives[track.joint]

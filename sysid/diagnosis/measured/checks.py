@@ -1,4 +1,4 @@
-"""Refuses records whose figures cannot be what their names say."""
+"""Refuses records whose values cannot be what their names say."""
 
 from collections.abc import Sequence
 

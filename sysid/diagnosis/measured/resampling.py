@@ -13,17 +13,23 @@ LONG_AGO = 1e6
 def smoothed(
     x: Float[np.ndarray, " n"], sigma: float, order: int = 0
 ) -> Float[np.ndarray, " n"]:
-    """Returns a Gaussian mean over the samples, or a derivative of it.
+    """A Gaussian mean over the samples, or a derivative of it.
 
-        X(ω) (iω)ᵏ exp(−ω² σ² / 2)
+        Y(ω) = X(ω) (iω)ᵏ exp(−ω² σ² / 2)
 
     The record is continued by its point reflection at both ends, so value and slope
     stay continuous there.
 
     Args:
-        x: evenly sampled signal.
-        sigma: width [samples].
+        x: evenly sampled signal, of any unit.
+        sigma: width σ [steps].
         order: k, of the derivative per sample.
+
+    Returns:
+        The signal in its unit, or per step to the power of k.
+
+    Source:
+        Zero-phase Gaussian filter, applied by its Fourier transform.
     """
     pad = min(len(x) - 1, int(6 * sigma) + 8)
     head, tail = 2 * x[0] - x[pad:0:-1], 2 * x[-1] - x[-2 : -pad - 2 : -1]
@@ -43,19 +49,22 @@ def held_targets(
     grid: Float[np.ndarray, " n"],
     slots: int,
 ) -> tuple[Float[np.ndarray, "n s"], Float[np.ndarray, "n s"]]:
-    """Returns the last targets before the ends of steps, and when they were sent.
+    """The last targets before the ends of steps, and when they were sent.
 
-    What acts at a time is what was sent before it.
+    At time t acts the last target sent, x(t) = x_i with t_i ≤ t < t_{i+1}.
 
     Args:
         t_s: times at which targets were sent, increasing [s].
-        values: the targets.
+        values: x, the targets [rad].
         grid: ends of the steps, evenly spaced [s].
         slots: number of targets that are returned.
 
     Returns:
-        Targets in their order, and their times less the end of the step, at most zero
-        [steps]. The first target counts as sent long before.
+        Targets in their order [rad], and their times less the end of the step, at most
+        zero [steps]. The first target counts as sent long before.
+
+    Source:
+        Ours: servos hold a target until the next message.
     """
     step_s = grid[1] - grid[0]
     last = np.searchsorted(t_s, grid, "right") - 1
@@ -66,7 +75,19 @@ def held_targets(
 
 
 def shares(sent: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:
-    """Returns for which shares of a step targets were held that were sent so."""
+    """Shares of a step for which targets were held: a_i = b_{i+1} − b_i.
+
+    With beginnings b_i = min(max(t_i + 1, 0), 1), b_0 = 0 and b_{s} = 1.
+
+    Args:
+        sent: t, when targets were sent before the end of the step, ≤ 0 [steps].
+
+    Returns:
+        a ≥ 0, which add up to 1 [1].
+
+    Source:
+        Ours; zero-order hold.
+    """
     begin = np.clip(sent + 1.0, 0.0, 1.0)
     begin[:, 0] = 0.0
     return np.diff(begin, append=1.0)

@@ -179,8 +179,8 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
             speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
-            valid &= ~_unsaid(t_s, values, fine, 1.6 * period, speed)
-            valid &= ~_untold(log, name, names["pos"], fine)
+            valid &= ~_unlogged_targets(t_s, values, fine, 1.6 * period, speed)
+            valid &= ~_switched_off(log, name, names["pos"], fine)
         else:
             columns[key] = np.interp(fine, t_s, values)
             valid &= _near(t_s, fine, 1.6 * period)
@@ -209,14 +209,14 @@ def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return t_s[last], values[last]
 
 
-def _unsaid(
+def _unlogged_targets(
     t_s: np.ndarray,
     values: np.ndarray,
     grid: np.ndarray,
     within_s: float,
     speed: float,
 ) -> np.ndarray:
-    """Tells where targets act that may have been sent but are not in the record.
+    """Where targets act that may have been sent but are not in the record.
 
     Behind a limit of the speed a target acts until it is reached.
     """
@@ -230,19 +230,19 @@ def _unsaid(
     return hidden
 
 
-def _untold(log: MeasuredLog, cmd: str, pos: str, grid: np.ndarray) -> np.ndarray:
-    """Tells where a record that has targets beside its angles has none for long.
+def _switched_off(log: MeasuredLog, cmd: str, pos: str, grid: np.ndarray) -> np.ndarray:
+    """Where a record that has targets in the rows of its angles has none for long.
 
     There the servo was switched off. Where targets have rows of their own, as messages
     have, silence says that the last one holds.
     """
-    told, read = (np.isfinite(log.columns[name]) for name in (cmd, pos))
+    sent, read = (np.isfinite(log.columns[name]) for name in (cmd, pos))
     off = np.zeros(len(grid), bool)
-    if np.mean(read[told]) < SHARED:
+    if np.mean(read[sent]) < SHARED:
         return off
-    said_s = np.append(np.sort(log.t_s[told]), np.inf)
-    alone_s = log.t_s[read & ~told]
-    for start, stop in itertools.pairwise(said_s):
+    sent_s = np.append(np.sort(log.t_s[sent]), np.inf)
+    alone_s = log.t_s[read & ~sent]
+    for start, stop in itertools.pairwise(sent_s):
         between = np.any((alone_s > start) & (alone_s < stop))
         if stop - start > FORGOTTEN_S and between:
             off |= (grid > start) & (grid < stop + FORGOTTEN_S)
@@ -250,6 +250,6 @@ def _untold(log: MeasuredLog, cmd: str, pos: str, grid: np.ndarray) -> np.ndarra
 
 
 def _near(t_s: np.ndarray, grid: np.ndarray, within_s: float) -> np.ndarray:
-    """Tells at which points of the grid both neighbours are near."""
+    """At which points of the grid both neighbours are near."""
     after = np.clip(np.searchsorted(t_s, grid), 1, len(t_s) - 1)
     return (t_s[after] - t_s[after - 1] <= within_s) | np.isin(grid, t_s)

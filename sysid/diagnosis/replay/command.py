@@ -30,29 +30,38 @@ EFFECTS = (
 """Effects that act here."""
 
 WITHIN = (0.35, 0.7)
-"""Times within a step at which the command is told too [steps]."""
+"""Times within a step at which the command is returned too [steps]."""
 
 _WITHIN = jnp.asarray(WITHIN)[:, None, None]
 
 Params = dict[str, dict[str, Float[Array, " c"]]]
 
+Commands = tuple[Float[Array, "t p c"], Float[Array, "t p c"], Float[Array, "t k p c"]]
+"""Commands at the steps of the grid, their ripple, and how far they still go within."""
+
 
 def command_path(
     held: Float[Array, "t s p"], sent: Float[Array, "t s p"], params: Params, dt: float
-) -> tuple[Float[Array, "t p c"], Float[Array, "t p c"], Float[Array, "t k p c"]]:
-    """Returns the commands of candidates c at the steps of the grid [rad or m].
+) -> Commands:
+    """Commands of candidates c at the steps of the grid: c(t) = path(t − T − L − d t).
+
+    The path rounds targets to a grid, passes them through a low-pass and limits their
+    speed; see `envs.actuator.effects`.
 
     Args:
-        held: the last targets before the end of every step, in their order.
+        held: the last targets before the end of every step, in their order [rad].
         sent: when they were sent before that end, negative [steps].
         params: values of the parameters by effect; effects may be missing.
         dt: step of the grid [s].
 
     Returns:
-        The commands, and their ripple: the mean about a step less what a smooth curve
-        through the commands at the steps would have there. A servo that is read as
-        often as targets come is always met at the same place of their saw. Last what
-        they still go at the times `WITHIN` until the end of the step.
+        The commands [rad], and their ripple: the mean about a step less what a smooth
+        curve through the commands at the steps would have there. A servo that is read
+        as often as targets come is always sampled at the same phase of their sawtooth.
+        Last what they still go at the times `WITHIN` until the end of the step.
+
+    Source:
+        Ours; exact response of a first-order low-pass to held targets.
     """
     given = {name: value for name, value in params.items() if name in EFFECTS}
     count = next(x for v in params.values() for x in v.values()).shape[0]

@@ -1,4 +1,4 @@
-"""A link behind play or a spring, led by the measured motion of its motor.
+"""A link behind play or a spring, driven by the measured motion of its motor.
 
 The encoder sits on the motor, so the link's angle is not measured. With x, the link's
 angle less the motor's, and all that acts on the link in the motor's frame,
@@ -11,6 +11,7 @@ F = load − J q̈_m,
 the motor feels the pull F − J ẍ.
 """
 
+import flax.struct
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -20,9 +21,6 @@ DAMPING = 0.1
 MOST_ROTOR = 0.9
 """Largest share of a joint's inertia that is on the motor's side."""
 
-POINTS = 64
-"""Number of frequencies over which noise is averaged."""
-
 EFFECTS = ("backlash", "compliance")
 """Effects that act here."""
 
@@ -30,99 +28,102 @@ State = tuple[Float[Array, "p c"], Float[Array, "p c"]]
 """Angle [rad] and speed [rad/s] of the link less the motor's."""
 
 
-def spring_noise(
-    inertia: Float[Array, "p c"],
-    rotor: Float[Array, "p c"],
-    compliance: Float[Array, "1 c"],
-    angle: Float[Array, ""],
-    effort: Float[Array, ""],
-    step_s: float,
-) -> Float[Array, "p c"]:
-    """Returns how much louder a spring makes the needed torque than a rigid link.
+@flax.struct.dataclass
+class Link:
+    """What connects motor and link.
 
-    What is noise in the motor's angle shakes the link at its own frequency. Without
-    this the fit would give the motor more of the inertia, and the spring less to shake.
-
-        A² = mean_ω (|J_m + J H|² ω⁴ s² + e²) / ((J_m + J)² ω⁴ s² + e²)
-
-    with H = 1 / (1 − ω² J C + 2 i ζ ω √(J C)); a residual is white up to half its rate.
-
-    Args:
+    Attributes:
         inertia: J, of the link [kg·m²].
-        rotor: J_m, on the motor's side [kg·m²].
-        compliance: C; 0 for none [rad/(N·m)].
-        angle: s, noise of the angle [rad].
-        effort: e, noise of the effort in the same band [N·m].
-        step_s: time between samples of the residual [s].
+        gap_rad: play b; 0 for none [rad].
+        compliance: C of the spring; 0 for none. Play goes before it [rad/(N·m)].
     """
-    omega = jnp.pi / step_s * (jnp.arange(POINTS) + 0.5)[:, None, None] / POINTS
-    shakes = omega**2 * jnp.maximum(angle, 1e-12)
-    lag = omega * jnp.sqrt(inertia * compliance)
-    link = inertia / (1.0 - lag**2 + 2.0j * DAMPING * lag)
-    soft = (jnp.abs(rotor + link) * shakes) ** 2 + effort**2
-    rigid = ((rotor + inertia) * shakes) ** 2 + effort**2
-    return jnp.where(compliance > 0.0, jnp.sqrt(jnp.mean(soft / rigid, 0)), 1.0)
+
+    inertia: Float[Array, "p c"]
+    gap_rad: Float[Array, "1 c"]
+    compliance: Float[Array, "1 c"]
+
+
+@flax.struct.dataclass
+class LinkForce:
+    """Torque on the link in the motor's frame, three times [N·m].
+
+    Attributes:
+        smoothed: F of the motion as it was smoothed.
+        sharp: F of the motion before smoothing.
+        together: torque on the link if motor and link moved as one under the motor's.
+    """
+
+    smoothed: Float[Array, "p c"]
+    sharp: Float[Array, "p c"]
+    together: Float[Array, "p c"]
+
+
+@flax.struct.dataclass
+class Pull:
+    """Mean pull on the motor during a step [N·m].
+
+    Attributes:
+        smoothed: of the motion as it was smoothed.
+        sharp: what is still to be smoothed.
+    """
+
+    smoothed: Float[Array, "p c"]
+    sharp: Float[Array, "p c"]
 
 
 def link_step(
-    state: State,
-    force: Float[Array, "p c"],
-    sharp: Float[Array, "p c"],
-    touch: Float[Array, "p c"],
-    inertia: Float[Array, "p c"],
-    gap_rad: Float[Array, "p c"],
-    compliance: Float[Array, "p c"],
-    dt: float,
-) -> tuple[State, Float[Array, "p c"], Float[Array, "p c"]]:
-    """Advances the link by a step.
+    state: State, force: LinkForce, link: Link, dt: float
+) -> tuple[State, Pull]:
+    """Advances the link by a step: J ẍ = F − D ẋ − x / C, or |x| ≤ b / 2.
 
-    A spring passes on what smoothing did to the motor's motion. Play does not: a
-    wall's blow, smoothed over the time before it, would brake the link on its way.
+    A spring passes on the smoothing of the motor's motion. Play does not: a wall's
+    blow, smoothed over the time before it, would brake the link on its way.
 
     Args:
-        state: at the beginning of the step.
-        force: F, of the motion as it was smoothed [N·m].
-        sharp: F, of the motion before [N·m].
-        touch: F, if motor and link moved as one under the motor's torque [N·m].
-        inertia: of the link, J [kg·m²].
-        gap_rad: play b; 0 for none.
-        compliance: C of the spring [rad/(N·m)]; 0 for none. Play goes before it.
+        state: x [rad] and ẋ [rad/s] at the beginning of the step.
+        force: F [N·m].
+        link: J, b and C.
         dt: step [s].
 
     Returns:
-        The state at its end, and the mean pull on the motor during it [N·m]: of the
-        motion as it was smoothed, and what is still to be smoothed.
+        The state at its end, and the pull F − J ẍ on the motor [N·m].
+
+    Source:
+        Ours; a spring's step is the solution of the damped oscillator for a constant
+        torque, and play is a mass between inelastic walls.
     """
-    x, speed = state
-    soft = _spring(x, speed, force, inertia, compliance, dt)
-    loose = _play(x, speed, sharp, touch, inertia, 0.5 * gap_rad, dt)
+    soft = _spring(state, force.smoothed, link, dt)
+    free = _play(state, force, link, dt)
+    plays = link.gap_rad > 0.0
     angle, rate = (
-        jnp.where(gap_rad > 0.0, a, jnp.where(compliance > 0.0, b, 0.0))
-        for a, b in zip(loose, soft, strict=True)
+        jnp.where(plays, a, jnp.where(link.compliance > 0.0, b, 0.0))
+        for a, b in zip(free, soft, strict=True)
     )
-    lost = inertia * (rate - speed) / dt
-    plays = gap_rad > 0.0
-    return (angle, rate), force - lost * ~plays, -lost * plays
+    lost = link.inertia * (rate - state[1]) / dt
+    pull = Pull(smoothed=force.smoothed - lost * ~plays, sharp=-lost * plays)
+    return (angle, rate), pull
 
 
-def _play(x, speed, sharp, touch, inertia, half, dt) -> State:
+def _play(state: State, force: LinkForce, link: Link, dt: float) -> State:
     """Flies freely, stops at a wall, and rests there while the motor pushes it.
 
-    The motor's torque tells whether it pushes: the noise of its acceleration would
+    The motor's torque decides whether it pushes: the noise of its acceleration would
     throw the link off, by about as much as angles are noisy. Angles belong to the steps
     of the grid and speeds to the middles between them, else a flight of n steps would
     go 1 + 1/n times as far. The last speed before a wall is the one that ends there.
     """
+    (x, speed), half = state, 0.5 * link.gap_rad
     place = jnp.clip(x + speed * dt, -half, half)
-    rests = (jnp.abs(place) >= half) & (touch * place > 0.0)
-    ahead = (speed + sharp / inertia * dt) * ~rests
+    rests = (jnp.abs(place) >= half) & (force.together * place > 0.0)
+    ahead = (speed + force.sharp / link.inertia * dt) * ~rests
     return place, jnp.clip(ahead, (-half - place) / dt, (half - place) / dt)
 
 
-def _spring(x, speed, force, inertia, compliance, dt) -> State:
-    """Swings about where the force holds it: exact for an even force."""
-    lag = jnp.maximum(compliance, 1e-9)
-    omega = jnp.sqrt(1.0 / (lag * inertia))
+def _spring(state: State, force: Float[Array, "p c"], link: Link, dt: float) -> State:
+    """Oscillates about its equilibrium under the force: exact for a constant one."""
+    x, speed = state
+    lag = jnp.maximum(link.compliance, 1e-9)
+    omega = jnp.sqrt(1.0 / (lag * link.inertia))
     away = x - force * lag
     turn = jnp.sqrt(1.0 - DAMPING**2) * omega
     fade = jnp.exp(-DAMPING * omega * dt)

@@ -1,408 +1,260 @@
-"""The actuator chain led along the measured motion, for many candidates at once.
+"""Equation-error residuals of many candidates along the measured motion.
 
-Instead of simulating the joint, the chain is run on the angles that were measured. Two
-residuals come out of every candidate, both in N·m:
+Instead of simulating the joint, the actuator chain is evaluated at the angles that were
+measured. Every candidate has two residuals, both in N·m:
 
-    controller:  measured effort − what the servo makes of target and measured angle
+    controller:  measured effort − torque of the servo at target and measured angle
     mechanics:   torque behind the gears + load − (I + J) q̈ − b q̇ − friction
 
-where the effort was logged it is also what enters the gears, so neither residual knows
-of errors in the other part; without it the servo's own torque enters. Nothing is
-integrated, so nothing drifts, sticks wrongly or needs an initial state.
+where the effort was logged it is also what enters the gears, so each residual is
+independent of errors in the other part; without it the servo's own torque enters.
+Nothing is integrated, so nothing drifts, sticks wrongly or needs an initial state.
 
 Candidates differ in numbers only: every effect of the catalogue is present, those that
 a candidate does not have at their identity. One compilation serves all of them.
 """
 
-import dataclasses
-from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import flax.struct
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
-from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
-from envs.actuator.effect import EffectKind, Stage
-from envs.actuator.surroundings import Gravity, Surroundings
-from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
-from sysid.diagnosis.replay import command, link
-from sysid.diagnosis.replay.torque_slope import SLOPE, within_steps
-
-BAND_STEPS = 2.2
-"""Width of the Gaussian through which both residuals pass [steps of the grid]."""
-
-EVERY = 4
-"""Steps of the grid between two samples of a residual."""
-
-_HALF = 8
-TAPS = np.exp(-0.5 * (np.arange(-_HALF, _HALF + 1) / BAND_STEPS) ** 2)
-TAPS = TAPS / TAPS.sum()
-
-FINE_TAPS = np.exp(-0.5 * (np.arange(-4, 5) / SMOOTH_STEPS) ** 2)
-FINE_TAPS = FINE_TAPS / FINE_TAPS.sum()
+from envs.actuator.effect import Substep
+from sysid.diagnosis.replay import link
+from sysid.diagnosis.replay.band import band, smooth
+from sysid.diagnosis.replay.command import command_path
+from sysid.diagnosis.replay.model import (
+    Candidates,
+    Nuisance,
+    Row,
+    at_step,
+    make_candidates,
+    rows_of,
+)
+from sysid.diagnosis.replay.motion import Track
+from sysid.diagnosis.replay.noise import residual_noise
+from sysid.diagnosis.replay.surroundings import surroundings_at
 
 
 @flax.struct.dataclass
-class Track:
-    """Measured motion of one joint in all pieces (p), step by step (t).
+class Carry:
+    """What a step leaves to the next.
 
     Attributes:
-        cmd, pos, vel, acc, jerk: target, encoder angle and its derivatives.
-        held, sent: see `Piece`.
-        slow_vel: speed that passed the band of the residuals, for friction.
-        effort: measured torque of the drive [N·m]; zero where it is not logged.
-        push: torque of all that is neither drive nor gravity [N·m].
-        ext: known push from outside, in its unit.
-        inertia: of the joint with all that it carries, in this posture [kg·m²].
-        moment, turned: moment of the carried masses, and the same a quarter turn on
-            [kg·m]; see `effects.surroundings.Gravity`.
-        gravity: in the frame of the mount [m/s²] (p, 3).
-        payload_moment, payload_shift, payload_inertia, payload_kg: of the payload.
-        others_nm, other_q, other_nm: what the neighbours do.
-        kp, kd: nominal gains by piece.
-        measured: 1 where the logged effort enters the gears, else 0 (p).
-        between: 1 where the command's ripple hides between the readings, else 0.
-        noise: noise of angle, its two derivatives and effort in both residuals, behind
-            their band and what whitens them.
+        states: of the effects.
+        q: joint angle [rad].
+        encoder: modelled reading at that angle [rad].
+        slope: change of the reading with the angle, ∂y/∂q [1].
+        link: angle [rad] and speed [rad/s] of the link less the motor's.
     """
 
-    cmd: Float[Array, "t p"]
-    held: Float[Array, "t s p"]
-    sent: Float[Array, "t s p"]
-    pos: Float[Array, "t p"]
-    vel: Float[Array, "t p"]
-    acc: Float[Array, "t p"]
-    jerk: Float[Array, "t p"]
-    slow_vel: Float[Array, "t p"]
-    effort: Float[Array, "t p"]
-    push: Float[Array, "t p"]
-    ext: Float[Array, "t p"]
-    inertia: Float[Array, "t p"]
-    moment: Float[Array, "t p 3"]
-    turned: Float[Array, "t p 3"]
-    payload_moment: Float[Array, "t p 3"]
-    payload_shift: Float[Array, "t p 3 3"]
-    payload_inertia: Float[Array, "t p"]
-    others_nm: Float[Array, "t p"]
-    other_q: Float[Array, "t p"]
-    other_nm: Float[Array, "t p"]
-    gravity: Float[Array, "p 3"]
-    payload_kg: Float[Array, " p"]
-    kp: Float[Array, " p"]
-    kd: Float[Array, " p"]
-    measured: Float[Array, " p"]
-    between: Float[Array, ""]
-    noise: Float[Array, "2 4"]
+    states: tuple[Any, ...]
+    q: Float[Array, "p c"]
+    encoder: Float[Array, "p c"]
+    slope: Float[Array, "p c"]
+    link: link.State
 
 
-_STEPWISE = tuple(
-    f.name
-    for f in dataclasses.fields(Track)
-    if f.name
-    not in (
-        *("cmd", "held", "sent"),
-        *("gravity", "payload_kg", "kp", "kd", "measured", "between", "noise"),
-    )
-)
+@flax.struct.dataclass
+class Torques:
+    """Terms of both residuals before their band, in units of the nominal noise.
 
-
-WALKING = ("finger_weakness",)
-"""Effects on joints that only records of a walking hand tell from other effects."""
-
-
-def joint_effects() -> tuple[str, ...]:
-    """Returns the effects of the catalogue that a joint can have, in their order."""
-    return tuple(n for n, kind in CATALOGUE.items() if kind.acts and n not in WALKING)
-
-
-def _pseudo(name: str, acts: Mapping[Stage, object], init=None) -> EffectKind:
-    extra = {"init": init} if init else {}
-    return EffectKind(name, "", {}, acts, {}, "", **extra)  # pyright: ignore
-
-
-def _slow(params, state, x, dt):
-    """Friction sees the speed without the noise of differentiation."""
-    return state, x.replace(qd=params["slow_vel"])
-
-
-def _sag(params, state, x, dt):
-    """Divides the torque by what all joints ask for, where the others' is measured.
-
-    Of the others' demands d the measured torques are V d, so V = 1 / (1 + s (τ + Σ d))
-    becomes (1 − s Σ V d) / (1 + s τ).
+    Attributes:
+        command: torque of the servo without its answer to angle and speed, in the unit
+            of the logged effort [N·m].
+        answer: that answer [N·m].
+        controller_gain: noise gain of the controller's residual [1].
+        needed: torque that the motion lacks, without friction, over the noise gain.
+        loose: torque of a link in its play, before smoothing, over the same.
+        enters: share of the servo's torque that enters the gears, over the same.
+        friction, viscous: friction [N·m] and [N·m·s/rad], over the same.
     """
-    sag = params["sag_per_nm"]
-    own = 1.0 / (1.0 + sag * jnp.abs(x.torque))
-    left = jnp.maximum(1.0 - sag * x.around.others_nm, 0.0) * own
-    return state, x.replace(torque=left * x.torque, follows=left * own * x.follows)
 
-
-def _enter(params, state, x, dt):
-    """Remembers the servo's torque and lets the measured one enter the gears."""
-    mixed = x.torque + params["measured"] * (params["effort"] - x.torque)
-    return x.torque, x.replace(torque=mixed + x.follows * x.kp * params["ripple"])
-
-
-def _read(params, state, x, dt):
-    """Remembers what the encoder would tell, and lets the servo have what it told."""
-    told = x.replace(encoder=params["angle"], encoder_speed=params["speed"])
-    return (x.encoder, x.encoder_speed), told
-
-
-_READ = _pseudo(
-    "measured_angle",
-    {Stage.ENCODER: _read},
-    lambda params, target, q, dt: (jnp.zeros_like(q), jnp.zeros_like(q)),
-)
-_SLOW = _pseudo("slow_speed", {Stage.FRICTION: _slow})
-_ENTER = _pseudo(
-    "measured_effort",
-    {Stage.TORQUE: _enter},
-    lambda params, target, q, dt: jnp.zeros_like(q),
-)
-KINDS = {
-    name: CATALOGUE[name] for name in joint_effects() if name not in command.EFFECTS
-}
-"""Effects that act behind the command path."""
-
-_RIGID = {n: kind for n, kind in KINDS.items() if n not in link.EFFECTS}
-_RIGID[SLOPE.name] = SLOPE
-_SAG = CATALOGUE["supply_sag"]
-_RIGID[_SAG.name] = dataclasses.replace(_SAG, acts={Stage.TORQUE: _sag})
+    command: Float[Array, "*t p c"]
+    answer: Float[Array, "*t p c"]
+    controller_gain: Float[Array, "*t p c"]
+    needed: Float[Array, "*t p c"]
+    loose: Float[Array, "*t p c"]
+    enters: Float[Array, "*t p c"]
+    friction: Float[Array, "*t p c"]
+    viscous: Float[Array, "*t p c"]
 
 
 @partial(jax.jit, static_argnames=("dt", "names"))
-def forced_residuals(
+def equation_error(
     track: Track,
     params: dict[str, dict[str, Float[Array, " c"]]],
-    nuisance: dict[str, Float[Array, " c"]],
+    nuisance: Nuisance,
     friction_speed: Float[Array, ""],
     dt: float,
     names: tuple[str, ...],
 ) -> Float[Array, "2 m p c"]:
-    """Returns the residuals (controller, mechanics) of candidates c [N·m].
+    """Residuals e = G (left side − right side) / A of candidates c.
+
+    G is the Gaussian band, A the noise gain, and the sides are those of the servo's
+    law and of the equation of motion:
+
+        controller  τ_log = (kp (c − y) − kd ẏ) / g
+        mechanics   τ_gears + τ_load = (μ I + J) q̈ + b q̇ + F sign q̇
 
     Where a joint may be at rest, its friction is whatever balances it: those samples
-    of the mechanics must not count. Near them friction turns round within the band.
+    of the mechanics must not count. Near them friction reverses within the band.
 
     Angles are noisy themselves, so both residuals are divided by the noise that a
-    candidate would have, relative to the simulation as it stands: otherwise the fit
-    would lower gains to silence the noise that they amplify. (The density of readings
-    whose exact values are unknown, at the most likely ones, has no other term.)
+    candidate would have, relative to the nominal simulation: otherwise the fit would
+    lower gains to reduce the noise that they amplify.
 
     Args:
         track: the measured motion.
-        params: values of the parameters of the effects by name.
-        nuisance: `effort_gain`, `mass`, `push_gain` (factors), `skew_s` (age of the
-            angle against the effort), `hold_s` (mean age at which a torque acts),
-            `rotor` (inertia on the motor's side of a play [kg·m²]).
-        friction_speed: speed below which a joint may be at rest.
+        params: values of the parameters of the effects by name, in their units.
+        nuisance: the other parameters.
+        friction_speed: speed below which a joint may be at rest [rad/s].
         dt: step of the grid [s].
         names: effects in the order of the chain.
+
+    Returns:
+        Controller and mechanics [N·m] at every `EVERY`-th step.
+
+    Source:
+        Equation-error (inverse dynamic) identification: M. Gautier and W. Khalil,
+        Exciting trajectories for the identification of base inertial parameters of
+        robots, 1992. The division by A is ours.
     """
-    path, ripple, ahead = command.command_path(track.held, track.sent, params, dt)
+    path, ripple, ahead = command_path(track.held, track.sent, params, dt)
     ripple = track.between * ripple
-    wide = {
-        n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in _RIGID
-    }
-    figures = ("effort_gain", "mass", "skew_s", "hold_s", "push_gain", "rotor")
-    gain, mass, skew, hold, pushed, rotor = (nuisance[k][None, :] for k in figures)
-    gap, soft, rotor = _between(params, rotor)
-    whole = mass * jnp.mean(track.inertia, 0)[:, None]
-    inner = jnp.minimum(rotor, link.MOST_ROTOR * whole)
-    heard = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
-    shaken = link.spring_noise(whole - inner, inner, soft, *heard)
+    candidates = make_candidates(track, params, nuisance, dt, names)
+    rows = rows_of(track, (path, ripple, ahead), dt)
+    start = _start(candidates, jax.tree.map(lambda v: v[0], rows))
+    step = partial(_step, candidates, friction_speed)
+    torques = jax.lax.scan(step, start, rows)[1]
+    return _residuals(torques, track, friction_speed)
 
-    def smooth_read(now):
-        """Returns angle and speed that the encoder told, as they were smoothed."""
-        return (
-            now["pos"] + skew * now["vel"],
-            now["vel"] + skew * now["acc"],
-        )
 
-    def sharp_read(now):
-        """Returns them before they were smoothed."""
-        angle, speed = smooth_read(now)
-        return (
-            angle - dull * (now["acc"] + skew * now["jerk"]),
-            speed - dull * now["jerk"],
-        )
+def _start(candidates: Candidates, row: Row) -> Carry:
+    """At rest at the first measured angle."""
+    row = at_step(row)
+    pos, count = row.motion.pos, candidates.gap_rad.shape[1]
+    q = jnp.broadcast_to(pos, (*pos.shape[:1], count))
+    none = jnp.zeros_like(q)
+    read = q + candidates.nuisance.skew_s * row.motion.vel
+    chain = candidates.chain(row)
+    states = init_states(chain, row.command, q, candidates.dt)
+    return Carry(states, read, read, none + 1.0, (none, none))
 
-    def model(now, ripple, ahead):
-        effort = gain * now["effort"]
-        measured = track.measured[:, None]
-        enter = {"effort": effort, "measured": measured, "ripple": ripple}
-        slow = {"slow_vel": now["slow_vel"] + 0.0 * gain}
-        moved, turned, eased = (x[:, :, None] for x in now["within"])
-        within = {
-            "error": ahead - moved - skew * turned,
-            "speed": turned + skew * eased,
-        }
-        body = (
-            (_RIGID[n], p | within if n == SLOPE.name else p) for n, p in wide.items()
-        )
-        angle, speed = sharp_read(now)
-        read = {"angle": angle, "speed": speed}
-        return ((_SLOW, slow), *body, (_READ, read), (_ENTER, enter))
 
-    def step(carry, row):
-        states, last, told, steep, behind = carry
-        row, within, target, ripple, ahead = row
-        now = {k: v[:, None] for k, v in row.items()} | {"within": within}
-        angle, rate = smooth_read(now)
-        # The angle of which the encoder would tell this: a step of Newton's method.
-        q = last + (angle - told) / steep
-        qd = rate / steep
-        away = (q - angle + behind[0])[..., None]
-        moment = jnp.cos(away) * now["moment"] + jnp.sin(away) * now["turned"]
-        moment = mass[..., None] * moment
-        gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
-        load = now["push"] + pushed * now["ext"] + jnp.sum(moment * gravity, -1)
-        payload_kg = jnp.broadcast_to(track.payload_kg[:, None], q.shape)
-        around = Surroundings(
-            others_nm=now["others_nm"],
-            other_q=now["other_q"],
-            other_nm=now["other_nm"],
-            gravity=Gravity(
-                gravity=gravity,
-                moment=moment,
-                payload_kg=payload_kg,
-                payload_moment=now["payload_moment"],
-                payload_shift=now["payload_shift"],
-                payload_inertia=now["payload_inertia"],
-            ),
-        )
-        kp, kd = track.kp[:, None], track.kd[:, None]
-        joint = JointInput(target, q, qd, load, kp, kd, around)
-        states, x = chain_step(model(now, ripple, ahead), states, joint, dt)
-        inertia = mass * now["inertia"] + x.inertia
-        share = jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0)
-        loud, usual = _loudness(track, now, x, share, gain, inertia / steep)
-        own = jnp.minimum(rotor, link.MOST_ROTOR * inertia)
-        # What encoders make of angles is as steep for speeds and accelerations.
-        moves = jnp.abs(qd) > 1e-6
-        encoder, speed = states[-2]
-        ratio = speed / (qd + 1.0 * ~moves)
-        before, steep = steep, ratio * moves + steep * ~moves
-        acc = now["acc"] + (skew + hold) * now["jerk"]
-        acc = (acc - (steep - before) / dt * qd) / steep  # y = f(q), ÿ = f' q̈ + ḟ' q̇
-        force = x.passive + x.load - (inertia - own) * acc
-        outer = inertia - own
-        sharp = force + outer * dull * now["snap"] / steep
-        way = jnp.clip(now["slow_vel"] / friction_speed, -1.0, 1.0)
-        bears = x.passive + x.load - x.viscous * now["slow_vel"] - x.friction * way
-        touch = (own * bears - outer * x.torque) / inertia
-        behind, pull, loose = link.link_step(
-            behind, force, sharp, touch, outer, gap, soft, dt
-        )
-        needs = x.torque - own * acc + pull
-        unit = gain * shaken * loud[1] / usual[1]
-        servo, (true_angle, true_rate) = states[-1], sharp_read(now)
-        enters = (1.0 - track.measured[:, None]) / unit
-        out = {
-            "command": (servo + x.kp * true_angle + x.kd * true_rate) / gain,
-            "answer": (x.kp * angle + x.kd * rate) / gain,
-            "quiet": loud[0] / usual[0],
-            "needs": needs / unit - enters * servo,
-            "loose": loose / unit,
-            "enters": gain * enters,
-            "friction": x.friction / unit,
-            "viscous": x.viscous / unit,
-        }
-        return (states, q, encoder, steep, behind), out
-
-    dull = 0.5 * (SMOOTH_STEPS * dt) ** 2
-    ramp = 1 + list(wide).index(SLOPE.name) if SLOPE.name in wide else 0
-    rows = {k: getattr(track, k) for k in _STEPWISE}
-    rows["snap"] = jnp.gradient(track.jerk, dt, axis=0)
-    angle, speed = track.pos - dull * track.acc, track.vel - dull * track.jerk
-    within = (
-        within_steps(angle, speed, dt),
-        within_steps(speed, track.acc, dt),
-        within_steps(track.acc, track.jerk, dt),
+def _step(
+    candidates: Candidates, friction_speed: Float[Array, ""], carry: Carry, row: Row
+) -> tuple[Carry, Torques]:
+    """Evaluates the chain at one step: servo, transmission, friction, noise."""
+    row, nuisance, track = at_step(row), candidates.nuisance, candidates.track
+    now, dt = row.motion, candidates.dt
+    angle, rate = candidates.reading(now)
+    # The angle at which the encoder would read this: a step of Newton's method.
+    q = carry.q + (angle - carry.encoder) / carry.slope
+    qd = rate / carry.slope
+    around, load = surroundings_at(
+        track, now, q - angle + carry.link[0], nuisance.mass, nuisance.push_gain
     )
-    first = {k: v[0][:, None] for k, v in rows.items()}
-    q0 = jnp.broadcast_to(first["pos"], (*first["pos"].shape[:1], gain.shape[1]))
-    none = jnp.zeros_like(q0)
-    read = q0 + skew * first["vel"]
-    at_rest = first | {"within": tuple(x[0] for x in within)}
-    states = init_states(model(at_rest, ripple[0], ahead[0]), path[0], q0, dt)
-    start = (states, read, read, none + 1.0, (none, none))
-    out = jax.lax.scan(step, start, (rows, within, path, ripple, ahead))[1]
-    vel, effort = track.slow_vel[:, :, None], track.effort[:, :, None]
-    return _filtered(out, effort, vel, friction_speed)
+    kp, kd = track.kp[:, None], track.kd[:, None]
+    joint = JointInput(row.command, q, qd, load, kp, kd, around)
+    states, x = chain_step(candidates.chain(row), carry.states, joint, dt)
+    inertia = nuisance.mass * now.inertia + x.inertia
+    gain = nuisance.effort_gain
+    ramp = candidates.slope_state
+    follows = jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0)
+    noise, nominal = residual_noise(track, now, x, follows, gain, inertia / carry.slope)
+    encoder, slope = _encoder_slope(states[-2], qd, carry.slope)
+    # y = f(q), ÿ = f' q̈ + ḟ' q̇
+    acc = now.acc + (nuisance.skew_s + nuisance.hold_s) * now.jerk
+    acc = (acc - (slope - carry.slope) / dt * qd) / slope
+    step = _JointStep(x, inertia, acc, row.snap, slope, now.slow_vel)
+    behind, needed, loose = _transmission(candidates, step, friction_speed, carry.link)
+    unit = gain * candidates.spring_gain * noise.mechanics / nominal.mechanics
+    servo, (sharp_angle, sharp_rate) = states[-1], candidates.sharp_reading(now)
+    enters = (1.0 - track.measured[:, None]) / unit
+    torques = Torques(
+        command=(servo + x.kp * sharp_angle + x.kd * sharp_rate) / gain,
+        answer=(x.kp * angle + x.kd * rate) / gain,
+        controller_gain=noise.controller / nominal.controller,
+        needed=needed / unit - enters * servo,
+        loose=loose / unit,
+        enters=gain * enters,
+        friction=x.friction / unit,
+        viscous=x.viscous / unit,
+    )
+    return Carry(states, q, encoder, slope, behind), torques
 
 
-def _between(params, rotor):
-    """Returns play, compliance and the motor's inertia of the candidates."""
-    absent = {"gap_rad": jnp.zeros_like(rotor[0])}
-    gap = params.get("backlash", absent)["gap_rad"][None]
-    spring = params.get("compliance")
-    if spring is None:
-        return gap, jnp.zeros_like(gap), rotor
-    soft, own = spring["compliance_rad_nm"][None], spring["motor_inertia_kgm2"][None]
-    return gap, soft, jnp.where(soft > 0.0, own, rotor)
+def _encoder_slope(modelled, qd, last):
+    """Returns the modelled reading and its slope ẏ / q̇; the last one at rest.
 
-
-def _loudness(track, now, x, share, gain, inertia):
-    """Noise of the residuals of a candidate, and as the simulation stands [N·m].
-
-    The servo's torque has its share of the noise that its gains make.
+    What encoders make of angles is as steep for speeds and accelerations.
     """
-    kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
-    servo, usual_servo = [], []
-    for angle, speed, _, _ in track.noise:
-        # A servo at its limit does not answer to the noise of the angle.
-        servo.append(share * jnp.hypot(x.kp * angle, x.kd * speed) / gain)
-        usual_servo.append(jnp.hypot(kp * angle, kd * speed))
-    _, speed, acc, effort = track.noise[1]
-    own = jnp.hypot(inertia * acc, x.viscous * speed) / gain
-    usual_own = now["inertia"] * acc
-    enters = servo[1] + measured * (effort - servo[1])
-    usual_enters = usual_servo[1] + measured * (effort - usual_servo[1])
-    told = track.noise[0, 3]
-    loud = (jnp.hypot(servo[0], told), jnp.hypot(own, enters))
-    usual = (jnp.hypot(usual_servo[0], told), jnp.hypot(usual_own, usual_enters))
-    return loud, usual
+    encoder, speed = modelled
+    moves = jnp.abs(qd) > 1e-6
+    ratio = speed / (qd + 1.0 * ~moves)
+    return encoder, ratio * moves + last * ~moves
 
 
-def _filtered(out, effort, vel, friction_speed):
-    """Passes the signals through the band and subtracts friction.
+@dataclass(frozen=True, eq=False)
+class _JointStep:
+    """The joint at one step: signals, inertia, motion and the encoder's slope."""
+
+    x: Substep
+    inertia: Float[Array, "p c"]
+    acc: Float[Array, "p c"]
+    snap: Float[Array, "p 1"]
+    slope: Float[Array, "p c"]
+    slow_vel: Float[Array, "p 1"]
+
+
+def _transmission(
+    candidates: Candidates, step: _JointStep, friction_speed, state: link.State
+):
+    """Advances the link behind the motor.
+
+    Returns:
+        Its state, and the torque that the motion lacks [N·m]: of the motion as it was
+        smoothed, and what is still to be smoothed.
+    """
+    x, inertia, acc = step.x, step.inertia, step.acc
+    own = jnp.minimum(candidates.nuisance.rotor, link.MOST_ROTOR * inertia)
+    force = x.passive + x.load - (inertia - own) * acc
+    outer = inertia - own
+    sharp = force + outer * candidates.smoothing_s2 * step.snap / step.slope
+    way = _direction(step.slow_vel, friction_speed)
+    bears = x.passive + x.load - x.viscous * step.slow_vel - x.friction * way
+    together = (own * bears - outer * x.torque) / inertia
+    state, pull = link.link_step(
+        state,
+        link.LinkForce(force, sharp, together),
+        link.Link(outer, candidates.gap_rad, candidates.compliance),
+        candidates.dt,
+    )
+    return state, x.torque - own * acc + pull.smoothed, pull.sharp
+
+
+def _direction(vel, friction_speed):
+    """Direction of dry friction in [−1, 1]: it turns over within the speeds of rest."""
+    return jnp.clip(vel / friction_speed, -1.0, 1.0)
+
+
+def _residuals(
+    torques: Torques, track: Track, friction_speed
+) -> Float[Array, "2 m p c"]:
+    """Passes the terms through the band and subtracts friction.
 
     The servo's torque is smoothed as the measured one was; its answer to angle and
     speed was smoothed with them.
     """
-    way = jnp.clip(vel / friction_speed, -1.0, 1.0)
-    servo = _smooth(out["command"]) - out["answer"]
-    needs = out["needs"] - out["viscous"] * vel - out["friction"] * way
-    mechanics = _band(needs + _smooth(out["loose"]) + out["enters"] * servo)
-    return jnp.stack([_band((effort - servo) / out["quiet"]), mechanics])
-
-
-def _smooth(x: Float[Array, "t p c"]) -> Float[Array, "t p c"]:
-    """Smooths a torque as the measured channels were.
-
-    The target is not smoothed before the chain: limits would act on round corners.
-    """
-    reach = len(FINE_TAPS) // 2
-    wide = jnp.pad(x, [(reach, reach), (0, 0), (0, 0)], "edge")
-    parts = [w * wide[k : k + len(x)] for k, w in enumerate(FINE_TAPS.tolist())]
-    return jnp.sum(jnp.stack(parts), 0)
-
-
-def _band(x: Float[Array, "t p c"]) -> Float[Array, "m p c"]:
-    """Gaussian mean of every `EVERY`-th step."""
-    count = (x.shape[0] - len(TAPS)) // EVERY + 1
-    last = (count - 1) * EVERY + 1
-    parts = [w * x[k : k + last : EVERY] for k, w in enumerate(TAPS.tolist())]
-    return jnp.sum(jnp.stack(parts), 0)
-
-
-def sample_rows(steps: int) -> np.ndarray:
-    """Returns the steps of the grid at which the residuals are sampled."""
-    count = (steps - len(TAPS)) // EVERY + 1
-    return _HALF + EVERY * np.arange(count)
+    vel, effort = track.slow_vel[:, :, None], track.effort[:, :, None]
+    way = _direction(vel, friction_speed)
+    servo = smooth(torques.command) - torques.answer
+    needed = torques.needed - torques.viscous * vel - torques.friction * way
+    mechanics = band(needed + smooth(torques.loose) + torques.enters * servo)
+    return jnp.stack([band((effort - servo) / torques.controller_gain), mechanics])

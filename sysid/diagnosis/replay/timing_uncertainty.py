@@ -1,4 +1,4 @@
-"""What the sampling of a record and the servo's own cycle may hide [N·m].
+"""Uncertainty of torques by the sampling of a record and the servo's own cycle [N·m].
 
 Both make a residual uncertain where much happens at once: its samples count less there.
 """
@@ -12,27 +12,39 @@ SAMPLING = 0.15
 """Share of a torque's fast changes that may be an artefact of sampling."""
 
 CYCLE_S = 2e-4
-"""Deviation of the time at which a target is taken: a servo of 1 kHz looks for a new
-one every millisecond [s]."""
-
-Array = Float[np.ndarray, "t p"]
+"""Standard deviation of the time at which a target is taken: a servo of 1 kHz looks
+for a new one every millisecond [s]."""
 
 
-def sampling_doubt(torque: Array) -> Array:
-    """Returns what may be lost of a torque that changes faster than it is sampled.
+def sampling_uncertainty(
+    torque: Float[np.ndarray, "t p"],
+) -> Float[np.ndarray, "t p"]:
+    """What may be lost of a torque that changes faster than it is sampled.
+
+        u_t = 0.15 √(Σ_{|k| ≤ 4} (∇² τ_{t+k})² / 9)
 
     Args:
-        torque: at the steps of the grid [N·m].
+        torque: τ at the steps of the grid [N·m].
+
+    Returns:
+        u ≥ 0 [N·m].
+
+    Source:
+        Ours; the share was measured on hidden cases.
     """
     fast = np.diff(torque, 2, axis=0, prepend=torque[:1], append=torque[-1:])
     mean = [np.convolve(x, np.ones(9) / 9.0, "same") for x in (fast**2).T]
     return SAMPLING * np.sqrt(np.stack(mean, 1))
 
 
-def timing_doubt(
-    cmd: Array, vel: Array, kp: Float[np.ndarray, " p"], drive: JointDrive, dt: float
-) -> Array:
-    """Returns how far the servo's torque may be off because of when targets are taken.
+def timing_uncertainty(
+    cmd: Float[np.ndarray, "t p"],
+    vel: Float[np.ndarray, "t p"],
+    kp: Float[np.ndarray, " p"],
+    drive: JointDrive,
+    dt: float,
+) -> Float[np.ndarray, "t p"]:
+    """How far the servo's torque may be off because of when targets are taken.
 
     A target that is taken Δ later moves the command by Δ ċ. The changes δ_i of the
     target are taken at times of their own, so
@@ -42,11 +54,17 @@ def timing_doubt(
     behind a low-pass of cutoff ω, and at most kp Δ v where the speed is limited to v.
 
     Args:
-        cmd: target at the steps of the grid.
-        vel: measured speed there.
-        kp: gain of the pieces.
-        drive: the simulation as it stands.
+        cmd: target at the steps of the grid [rad].
+        vel: measured speed there [rad/s].
+        kp: gain of the pieces [N·m/rad].
+        drive: the nominal simulation.
         dt: step of the grid [s].
+
+    Returns:
+        σ ≥ 0 [N·m].
+
+    Source:
+        Ours; a Poisson sum of the responses of a first-order low-pass.
     """
     cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
     speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)

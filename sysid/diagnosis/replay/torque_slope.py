@@ -26,19 +26,25 @@ NAME = "torque_slope_limit"
 def within_steps(
     x: Float[Array, "t p"], rate: Float[Array, "t p"], dt: float
 ) -> Float[Array, "t k p"]:
-    """Returns how far a signal still goes at the times `WITHIN` until a step's end.
+    """How far a signal still goes at the times `WITHIN` until a step's end.
 
-    Cubics through values and rates at both ends of the step.
+    d(u) = x_1 − x(u), with x(u) on the cubic through values and rates of both ends.
 
     Args:
-        x: signal at the ends of the steps.
-        rate: its derivative there [1/s].
+        x: signal at the ends of the steps [rad], or a derivative of an angle.
+        rate: its derivative there, per second.
         dt: step [s].
+
+    Returns:
+        d at times u in (0, 1) of the step, in the unit of x.
+
+    Source:
+        Textbook Hermite interpolation.
     """
     u = jnp.asarray(WITHIN)[None, :, None]
     last, before = (jnp.concatenate([v[:1], v[:-1]])[:, None] for v in (x, rate))
-    bent = u * (1.0 - u) * ((1.0 - u) * before - u * rate[:, None]) * dt
-    return (x[:, None] - last) * (1.0 - u**2 * (3.0 - 2.0 * u)) - bent
+    by_rates = u * (1.0 - u) * ((1.0 - u) * before - u * rate[:, None]) * dt
+    return (x[:, None] - last) * (1.0 - u**2 * (3.0 - 2.0 * u)) - by_rates
 
 
 def _act(params: Params, state, x, dt):
@@ -65,6 +71,6 @@ def _rest(params: Params, target, q, dt):
 
 
 SLOPE: EffectKind = replace(CATALOGUE[NAME], acts={Stage.TORQUE: _act}, init=_rest)
-"""The effect as it acts along a measured motion: beside its slope it takes how far
+"""The effect as it acts along a measured motion: with its slope it takes how far
 `error` and `speed` still go at the times `WITHIN` [rad], [rad/s]. Its state: the torque
 [N·m] and the share of the gains with which a limited torque bears noise."""

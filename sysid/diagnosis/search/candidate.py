@@ -1,5 +1,8 @@
 """Candidates: fitted on all data, scored on folds that a fit did not see.
 
+    S(M) = Σ_g ‖r_g(θ̂_{−g})‖² + Σ_i ((θ̂_i − θ⁰_i) / σ_i)²
+
+with whitened residuals r_g of fold g, and the second sum over the nuisance parameters.
 The parameters θ̂_{−g} without fold g come from one Gauss-Newton step at the common
 optimum, on all other folds.
 """
@@ -7,10 +10,13 @@ optimum, on all other folds.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.noise_gain import loudness
+from sysid.diagnosis.replay.band import EVERY
+from sysid.diagnosis.replay.link import MOST_ROTOR
+from sysid.diagnosis.replay.noise import spring_noise_gain
 from sysid.diagnosis.search.problem import Problem
 from sysid.least_squares import Fit, Task, fit_all
 
@@ -22,13 +28,13 @@ class Model:
     Attributes:
         effects: the released effects.
         fit: on all data.
-        score: S, the error on held-out folds.
-        penalty: its part from the nuisances.
+        score: S, the squared error on held-out folds with the prior's part.
+        penalty: the prior's part, of the nuisance parameters.
         fold_theta: coordinates without each fold.
-        errors: mean squared weighted residual on all data (controller, mechanics); 1
-            where noise is all that is left. Held-out folds would not tell: one that
-            alone tells a figure is badly predicted without it.
-        loudness: what it pays for noise that it calls loud [nat].
+        errors: mean squared whitened residual on all data (controller, mechanics); 1
+            where only noise remains. Held-out folds would not show it: a fold that
+            alone excites a parameter is badly predicted without it.
+        noise_cost: n log A, log-likelihood that is lost by amplified noise [1].
     """
 
     effects: tuple[str, ...]
@@ -37,38 +43,93 @@ class Model:
     penalty: float
     fold_theta: Float[np.ndarray, "g n"]
     errors: Float[np.ndarray, "2"]
-    loudness: float
+    noise_cost: float
 
 
-def gain_nat(worse: Model, better: Model, samples: int) -> float:
-    """Returns the gain in error [nat], less what is gained by calling noise loud.
+def log_likelihood_gain(worse: Model, better: Model, samples: int) -> float:
+    """Gain in log predictive likelihood, Δ log L = ΔS / 2 s² − Δ(n log A).
 
-    A spring that both have drifts from fit to fit: that it calls less is no merit.
+    Of two springs the one that drifts to less noise gains nothing by that.
     """
-    quieter = worse.loudness - better.loudness
-    if worse.loudness > 0.0 and better.loudness > 0.0:
+    quieter = worse.noise_cost - better.noise_cost
+    if worse.noise_cost > 0.0 and better.noise_cost > 0.0:
         quieter = min(quieter, 0.0)
-    return error_nat(worse, better, samples) + quieter
+    return heldout_gain(worse, better, samples) + quieter
 
 
-def error_nat(worse: Model, better: Model, samples: int) -> float:
-    """Returns ½ (S_worse − S_better) / max(1, s²), s² the error per sample left.
+def heldout_gain(worse: Model, better: Model, samples: int) -> float:
+    """The part of the gain from errors, ½ min(ΔS, ΔC) / max(1, s²).
 
-    The errors on all data must fall as much: a fold that alone tells a figure is badly
-    predicted from its tolerance, and that is not the simulation's fault.
+    s² = S / n is the error per sample that remains. The cost C on all data must fall as
+    much: a fold that alone excites a parameter is badly predicted from its prior, and
+    that is not the simulation's fault.
     """
     held, fitted = worse.score - better.score, worse.fit.cost - better.fit.cost
     return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
 
 
-def bent(problem: Problem, model: Model, effect: str) -> float:
-    """Returns how far an effect's figures lie from where they are [deviations]."""
+def off_prior(problem: Problem, model: Model, effect: str) -> float:
+    """Largest distance of an effect's parameters from nominal [prior deviations]."""
     away = [
-        abs(model.fit.theta[i] - slot.base) / slot.tight
+        slot.shift(model.fit.theta[i])
         for i, slot in enumerate(problem.space.slots)
-        if slot.effect == effect and 0.0 < slot.tight < np.inf
+        if slot.effect == effect and 0.0 < slot.prior_sd < np.inf
     ]
     return max(away, default=0.0)
+
+
+def at_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
+    """Coordinates of a fit with its nuisance parameters at their nominal values.
+
+    θ_i = θ̂_i for the parameters of the model's effects, else θ⁰_i.
+
+    Args:
+        problem: residuals of a joint.
+        model: a fitted model.
+
+    Returns:
+        Coordinates, in units of their scales [1].
+
+    Source:
+        Ours: starts from which nuisance parameters cannot compensate each other.
+    """
+    theta = problem.space.nominal.copy()
+    kept = [i for e in model.effects for i in problem.space.of(e)]
+    theta[kept] = model.fit.theta[kept]
+    return theta
+
+
+def noise_cost(problem: Problem, theta: Float[np.ndarray, " n"], error: float) -> float:
+    """Log-likelihood that amplified noise costs the mechanics: Δ log L = n log A.
+
+    Residuals are divided by the noise that a candidate would have. A spring between
+    motor and link turns encoder noise into torque at its resonance: the density of n
+    readings falls by Aⁿ where their noise is A times as large.
+
+    Args:
+        problem: with its noise.
+        theta: coordinates of the candidate [1].
+        error: mean squared whitened residual; below one where samples are correlated,
+            so that fewer count.
+
+    Returns:
+        n log A [1]; zero without a spring.
+
+    Source:
+        Ours; the normalization of a Gaussian density of standard deviation A σ.
+    """
+    where = problem.space.of("compliance")
+    if not where or theta[where[0]] <= 0.0:
+        return 0.0
+    slots, track = problem.space.slots, problem.data.track
+    soft, rotor = (float(slots[i].value(theta[i])) for i in where)
+    whole = float(np.mean(np.asarray(track.inertia)))
+    rotor = min(rotor, MOST_ROTOR * whole)
+    noise = (track.noise[1, 0], track.noise[1, 3], EVERY * problem.data.dt)
+    inner, spring, rest = (jnp.full((1, 1), x) for x in (rotor, soft, whole - rotor))
+    gain = float(spring_noise_gain(rest, inner, spring, *noise)[0, 0])
+    count = float(problem.channel_counts()[1])
+    return count * min(1.0, error) * float(np.log(gain))
 
 
 def fit_models(
@@ -78,7 +139,25 @@ def fit_models(
     shared: dict | None = None,
     rounds: int = 5,
 ) -> list[Model]:
-    """Fits models from given starts and scores them on held-out folds."""
+    """Fits models from given starts and scores them on held-out folds.
+
+        θ̂ = argmin_θ ‖r(θ)‖² + Σ_i ((θ_i − θ⁰_i) / σ_i)²
+
+    Args:
+        problem: residuals of a joint.
+        sets: released effects of every model.
+        starts: first coordinates of every model [1].
+        shared: columns of the Jacobian that are taken as they are.
+        rounds: Levenberg-Marquardt steps.
+
+    Returns:
+        One model for every start.
+
+    Source:
+        Maximum a-posteriori estimate with Gaussian noise and priors; cross-validation:
+        M. Stone, Cross-validatory choice and assessment of statistical predictions,
+        1974. The single Gauss-Newton step per fold is ours.
+    """
     tasks = [_task(problem, s, t) for s, t in zip(sets, starts, strict=True)]
     fits = fit_all(problem.residual, tasks, rounds, shared=shared)
     return _scored(problem, sets, tasks, fits)
@@ -86,17 +165,17 @@ def fit_models(
 
 def _task(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task:
     space = problem.space
-    deviation = space.deviations(effects)
-    free = np.flatnonzero(deviation > 0.0)
-    start = np.where(deviation > 0.0, start, space.base)
+    prior_sd = space.prior_sds(effects)
+    free = np.flatnonzero(prior_sd > 0.0)
+    start = np.where(prior_sd > 0.0, start, space.nominal)
     low = np.array([s.low for s in space.slots])
     high = np.array([s.high for s in space.slots])
-    wide = np.where(deviation > 0, deviation, 1.0)
-    comb = np.array([s.comb for s in space.slots])
-    steps = np.where(comb, 3e-4 * np.maximum(np.abs(start), 1e-6), 0.0)
+    wide = np.where(prior_sd > 0, prior_sd, 1.0)
+    many = np.array([s.many_optima for s in space.slots])
+    steps = np.where(many, 3e-4 * np.maximum(np.abs(start), 1e-6), 0.0)
     # A limit that the smaller model does not reach has no slope there.
     fresh = tuple(space.of(effects[-1])) if effects else ()
-    return Task(start, free, space.base, wide, low, high, steps, fresh)
+    return Task(start, free, space.nominal, wide, low, high, steps, fresh)
 
 
 def _scored(problem, sets, tasks, fits) -> list[Model]:
@@ -110,7 +189,7 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         ]
     )
     squares = problem.residual(thetas) ** 2
-    counted = problem.counts().reshape(2, -1).sum(1)
+    counted = problem.channel_counts()
     models = []
     for k, (effects, fit) in enumerate(zip(sets, fits, strict=True)):
         mine = squares[k * count : (k + 1) * count]
@@ -120,13 +199,13 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         penalty = _penalty(problem, tasks[k], effects, fit.theta)
         score = score + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
-        loud = loudness(problem, fit.theta, float(errors[1]))
-        models.append(Model(tuple(effects), fit, score, penalty, kept, errors, loud))
+        cost = noise_cost(problem, fit.theta, float(errors[1]))
+        models.append(Model(tuple(effects), fit, score, penalty, kept, errors, cost))
     return models
 
 
 def _penalty(problem: Problem, task: Task, effects, theta: np.ndarray) -> float:
-    """Squared deviations of the figures that should be inside their tolerances."""
+    """Squared distance of the nuisance parameters from nominal [prior deviations²]."""
     slots = problem.space.slots
     kept = [i for i in task.free if slots[i].effect not in effects]
     return float(np.sum(((theta - task.center)[kept] / task.deviation[kept]) ** 2))
@@ -135,10 +214,10 @@ def _penalty(problem: Problem, task: Task, effects, theta: np.ndarray) -> float:
 def _without(
     fit: Fit, task: Task, folds: np.ndarray, g: int, local: list[int]
 ) -> np.ndarray:
-    """Returns the coordinates that the data without one fold ask for.
+    """Estimates the coordinates from the data without one fold.
 
-    What belongs to a record and not to the mechanism stays. What the fit has not
-    reached yet on all data is not the fold's.
+    What belongs to a record and not to the mechanism stays. The step that a fit would
+    still take on all data is subtracted: it does not come from the fold.
     """
     k = fit.free
     weight = 1.0 / task.deviation[k] ** 2

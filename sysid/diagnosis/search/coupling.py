@@ -4,7 +4,7 @@ import dataclasses
 
 import jax.numpy as jnp
 
-from sysid.diagnosis.replay.track import JointTrack
+from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.candidate import Model, fit_models
 from sysid.diagnosis.search.problem import Problem
 
@@ -12,22 +12,25 @@ EFFECT = "joint_coupling"
 
 
 def coupled(problem: Problem, base: Model) -> Problem:
-    """Puts the neighbour into the track with which a coupling leaves the least error.
+    """Takes the neighbour whose coupling gives the smallest error into the track.
 
     Args:
-        problem: with the noise settled.
-        base: the simulation with its nuisances fitted.
+        problem: with its final noise.
+        base: the nominal model with its nuisance parameters fitted.
     """
     names = list(problem.data.neighbours)
     if len(names) < 2 or EFFECT not in problem.space.effects:
         return problem
-    others = [dataclasses.replace(problem, data=beside(problem.data, n)) for n in names]
+    others = [
+        dataclasses.replace(problem, data=with_neighbour(problem.data, n))
+        for n in names
+    ]
     start = base.fit.theta
     costs = [fit_models(p, [(EFFECT,)], [start])[0].fit.cost for p in others]
     return others[costs.index(min(costs))]
 
 
-def beside(track: JointTrack, name: str) -> JointTrack:
+def with_neighbour(track: JointTrack, name: str) -> JointTrack:
     """Returns the track with another joint as the one that pulls."""
     q, nm = track.neighbours[name]
     fields = {"other_q": jnp.asarray(q, jnp.float32)}

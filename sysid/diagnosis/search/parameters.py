@@ -4,46 +4,20 @@
     log         x = s eᵘ        factors, and parameters that only shape an effect
     reciprocal  x = s / u       limits and cutoffs, which vanish at infinity: u = 0
 
-Sizes s come from what occurs in the records, so a heavy axis and a finger joint look
+Scales s come from what occurs in the records, so a heavy axis and a finger joint look
 alike, and a change of unit changes nothing.
 """
 
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import ArrayLike, Float
 
-from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.effect import Parameter
-from sysid.diagnosis.replay.residuals import joint_effects
-from sysid.diagnosis.replay.track import JointTrack
-from sysid.mechanism import JointDrive, Nominal
-
-SIGMA = 3.0**-0.5
-"""Deviation of a figure that may be anywhere within its tolerance, in tolerances."""
-
-SKEW_S = 5e-4
-"""Largest age of the angle against the effort that is no news [s]."""
-
-HOLD_S = 5e-4
-"""Largest mean age of an acting torque that is no news: a servo of 1 kHz keeps one for
-a millisecond [s]."""
-
-DELAY_S = 1e-3
-"""Largest deviation of a known delay that is no news, whatever its tolerance [s]."""
-
-MASS = 0.05
-"""Largest relative deviation of masses and inertias that is no news."""
-
-ZERO_RAD = 1e-3
-"""Largest error of an encoder's zero that is no news, where none is told [rad]."""
-
-ROTOR = 1.0
-"""Largest logarithm by which the motor's share of a joint's inertia may be wrong."""
+from sysid.diagnosis.replay.model import Nuisance
 
 NUISANCE = ""
 Kind = Literal["linear", "log", "reciprocal"]
@@ -57,13 +31,13 @@ class Slot:
         effect, name: parameter; the effect is "" for what belongs to none.
         unit: of the parameter.
         kind, scale: how coordinate and parameter go together; see the module.
-        base: coordinate in the simulation as it stands.
+        nominal: coordinate in the nominal simulation.
         low, high: range of the search.
-        tight: prior deviation; 0: fixed unless released; inf: free.
+        prior_sd: prior standard deviation; 0: fixed unless released; inf: free.
         starts: coordinates from which a search begins.
-        vanishes: whether the effect is absent at `base`.
-        wide: prior deviation once it is released.
-        comb: whether it has many optima beside each other, as the step of a grid has.
+        vanishes: whether the effect is absent at `nominal`.
+        many_optima: whether it has many local optima, as the step of a grid has.
+        released_sd: prior standard deviation once it is released.
     """
 
     effect: str
@@ -71,23 +45,34 @@ class Slot:
     unit: str
     kind: Kind
     scale: float
-    base: float
+    nominal: float
     low: float
     high: float
-    tight: float
+    prior_sd: float
     starts: tuple[float, ...]
     vanishes: bool
-    comb: bool = False
-    wide: float = 5.0
+    many_optima: bool = False
+    released_sd: float = 5.0
 
-    def value(self, u: Float[np.ndarray, "*c"]) -> Float[np.ndarray, "*c"]:
-        """Returns the parameter at a coordinate."""
+    def value(self, u: Float[ArrayLike, "*c"]) -> Float[np.ndarray, "*c"]:
+        """Parameter at a coordinate: x = s u, s eᵘ or s / u; see the module.
+
+        Args:
+            u: coordinates [1]; negative ones of a reciprocal count as zero.
+
+        Returns:
+            Values in the unit of the parameter; ∞ at u = 0 of a reciprocal.
+
+        Source:
+            Ours.
+        """
+        u = np.asarray(u)
         if self.kind == "linear":
-            return self.scale * u
+            return np.asarray(self.scale * u)
         if self.kind == "log":
-            return self.scale * np.exp(u)
+            return np.asarray(self.scale * np.exp(u))
         with np.errstate(divide="ignore"):
-            return self.scale / np.maximum(u, 0.0)
+            return np.asarray(self.scale / np.maximum(u, 0.0))
 
     def coordinate(self, x: float) -> float:
         """Returns the coordinate of a value."""
@@ -97,6 +82,15 @@ class Slot:
             return math.log(max(x, 1e-12) / self.scale)
         return self.scale / x
 
+    @property
+    def label(self) -> str:
+        """Name for messages: `effect.name`, or the name of a nuisance parameter."""
+        return f"{self.effect}.{self.name}".lstrip(".")
+
+    def shift(self, u: float) -> float:
+        """Distance of a coordinate from nominal [prior standard deviations]."""
+        return abs(u - self.nominal) / self.prior_sd
+
 
 @dataclass(frozen=True)
 class Space:
@@ -105,9 +99,9 @@ class Space:
     slots: tuple[Slot, ...]
 
     @property
-    def base(self) -> Float[np.ndarray, " n"]:
-        """The simulation as it stands."""
-        return np.array([s.base for s in self.slots])
+    def nominal(self) -> Float[np.ndarray, " n"]:
+        """The nominal simulation."""
+        return np.array([s.nominal for s in self.slots])
 
     @property
     def effects(self) -> tuple[str, ...]:
@@ -118,19 +112,29 @@ class Space:
         """Indices of the coordinates of an effect."""
         return [i for i, s in enumerate(self.slots) if s.effect == effect]
 
-    def figured(self, effect: str) -> bool:
-        """Tells whether the simulation has all figures of an effect."""
-        return all(self.slots[i].tight > 0.0 for i in self.of(effect))
+    def has_nominal(self, effect: str) -> bool:
+        """Whether the simulation has nominal values of all parameters of an effect."""
+        return all(self.slots[i].prior_sd > 0.0 for i in self.of(effect))
 
     def nuisances(self) -> list[int]:
         """Indices of the coordinates that every candidate may adjust."""
-        return [i for i, s in enumerate(self.slots) if s.tight > 0.0]
+        return [i for i, s in enumerate(self.slots) if s.prior_sd > 0.0]
 
-    def deviations(self, released: Sequence[str]) -> Float[np.ndarray, " n"]:
-        """Prior deviations with some effects released; 0 for what stays fixed."""
+    def prior_sds(self, released: Sequence[str]) -> Float[np.ndarray, " n"]:
+        """Prior standard deviations: σ_i = `released_sd` if released, else `prior_sd`.
+
+        Args:
+            released: effects whose parameters may leave their tolerances.
+
+        Returns:
+            σ in units of the coordinates' scales [1]; 0 for what stays fixed.
+
+        Source:
+            Ours.
+        """
         return np.array(
             [
-                s.wide if s.effect in released else min(s.tight, _FREE)
+                s.released_sd if s.effect in released else min(s.prior_sd, _FREE)
                 for s in self.slots
             ]
         )
@@ -154,8 +158,18 @@ class Space:
             for us in itertools.product(*grids)
         ]
 
-    def values(self, theta: Float[np.ndarray, "c n"]) -> tuple[dict, dict]:
-        """Returns (parameters by effect, nuisances) of candidates."""
+    def values(self, theta: Float[np.ndarray, "c n"]) -> tuple[dict, Nuisance]:
+        """Values x_i = s_i u_i, s_i e^{u_i} or s_i / u_i of candidates; see `Slot`.
+
+        Args:
+            theta: coordinates u of candidates [1].
+
+        Returns:
+            Parameters by effect and name, and nuisance parameters, in their units.
+
+        Source:
+            Ours.
+        """
         params: dict[str, dict] = {}
         nuisance = {}
         for column, slot in zip(theta.T, self.slots, strict=True):
@@ -165,7 +179,7 @@ class Space:
             else:
                 nuisance[slot.name] = x
         nuisance.setdefault("push_gain", np.ones(len(theta), np.float32))
-        return params, nuisance
+        return params, Nuisance(**nuisance)
 
     def local(self) -> list[int]:
         """Indices of what belongs to a record and not to the mechanism."""
@@ -174,176 +188,3 @@ class Space:
 
 _FREE = 5.0
 _LOGS = ("stiffness", "damping", "encoder_scale")
-
-
-def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> Space:
-    """Makes the coordinates of one joint.
-
-    Args:
-        track: the records, for sizes.
-        drive: what the simulation has, and tolerances.
-        known: which surroundings are known, by field name.
-    """
-    slots = [
-        _pseudo("effort_gain", "1", "log", 1.0, drive.effort_scale.tolerance),
-        _pseudo("mass", "1", "log", 1.0, MASS),
-        _pseudo("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
-        _pseudo("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
-    ]
-    inertia = float(np.mean(np.asarray(track.track.inertia)))
-    rotor = 0.5 * track.armature if track.armature > 0.0 else 0.1 * inertia
-    slots.append(_pseudo("rotor", "kg·m²", "log", rotor, ROTOR))
-    if np.any(np.asarray(track.track.ext)):
-        free = _pseudo("push_gain", "1", "linear", 1.0, math.inf)
-        slots.append(replace(free, base=1.0))
-    if drive.effort_scale.free:
-        slots[0] = replace(slots[0], tight=math.inf)
-    sizes = _sizes(track)
-    for effect in joint_effects():
-        kind = CATALOGUE[effect]
-        if all(known.get(name, False) for name in kind.needs):
-            figures = _figures(drive, effect, track)
-            for name, parameter in kind.parameters.items():
-                figure = figures.get(name)
-                made = _slot(effect, name, parameter, figure, sizes, track.slide)
-                slots.append(made)
-    return Space(tuple(slots))
-
-
-def _pseudo(name: str, unit: str, kind: Kind, scale: float, tight: float) -> Slot:
-    sigma = SIGMA * tight
-    return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, sigma, (), False)
-
-
-def _figures(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Nominal]:
-    """Returns what the simulation has of an effect."""
-    if effect == "stiffness":
-        return {"scale": replace(drive.kp, value=1.0)}
-    if effect == "damping":
-        return {"scale": replace(drive.kd, value=1.0)}
-    found = drive.effects.get(effect, {})
-    if effect == "armature" and not found:
-        # Masses scale all of it; drive and links may be wrong in opposite ways.
-        known = math.sqrt(2.0) * track.armature
-        inertia = known or float(np.mean(np.asarray(track.track.inertia)))
-        return {"inertia_kgm2": Nominal(0.0, MASS * inertia)}
-    if effect == "payload_mass" and not found:
-        return {"mass_kg": Nominal(0.0, MASS * float(np.mean(track.track.payload_kg)))}
-    if effect == "encoder_offset" and not found and not track.slide:
-        return {"offset_rad": Nominal(0.0, ZERO_RAD)}
-    return found
-
-
-def _sizes(track: JointTrack) -> dict[str, float]:
-    """Returns a size that matters for every unit."""
-    torque, speed, angle = track.torque_scale, track.speed_scale, track.angle_scale
-    inertia = max(float(np.mean(np.asarray(track.track.inertia))), 1e-12)
-    return {
-        "N·m": torque,
-        "rad": 0.1 * angle,
-        "rad/s": speed,
-        "N·m·s/rad": torque / speed,
-        "kg·m²": inertia,
-        "N·m/s": torque / 0.03,
-        "1/(N·m)": 1.0 / torque,
-        "1/(N·m)²": 1.0 / torque**2,
-        "rad/(N·m)": 0.05 * angle / torque,
-        "N·m/rad": torque / angle,
-        "s": 0.02,
-    }
-
-
-_GRIDS = {
-    "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
-    # Half the width of a resonance apart: ω ∝ 1 / √C.
-    "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
-}
-_TEETH = (0.015, 1.0)
-_RECIPROCAL = {
-    "N·m": (1.0, 1.2, 1.6),
-    "rad/s": (0.6, 0.9, 1.2, 1.8),
-    # A little too tight a limit is far worse than none: its optimum is narrow.
-    "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
-}
-
-
-def _slot(
-    effect: str,
-    name: str,
-    parameter: Parameter,
-    figure: Nominal | None,
-    sizes: dict[str, float],
-    slide: bool,
-) -> Slot:
-    """Makes the coordinate of one parameter."""
-    prior, identity = parameter.prior, parameter.identity
-    size = sizes.get(parameter.unit)
-    if identity is None:  # a shape: any positive size
-        scale = prior.center
-        if size is not None and parameter.unit != "s":
-            scale = 0.1 * size
-        spread = math.log(prior.spread)
-        reach, some = 3.0 * spread + 2.0, 1.2 * spread
-        slot = Slot(effect, name, parameter.unit, "log", scale, 0.0, -reach, reach,
-                    0.0, (-some, 0.0, some), True)  # fmt: skip
-    elif math.isinf(identity):
-        scale = size if size is not None else prior.center
-        starts = _RECIPROCAL.get(parameter.unit, (0.1, 0.3, 1.0, 2.0))
-        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 50.0,
-                    0.0, starts, True)  # fmt: skip
-    elif identity == 1.0:
-        slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,
-                    (-0.3, -0.05, 0.05, 0.3), True)  # fmt: skip
-        slot = replace(slot, wide=3.0 * math.log(prior.spread))
-    else:
-        scale = size
-        if scale is None:
-            scale = prior.spread if prior.kind == "normal" else prior.center
-        signed = parameter.low < 0.0
-        grid = _GRIDS.get(parameter.unit, (0.1,))
-        if size is None:
-            grid = (0.5,)
-        starts = (0.1, -0.1) if signed else grid
-        low = -30.0 if signed else 0.0
-        slot = Slot(effect, name, parameter.unit, "linear", scale, 0.0, low, 30.0,
-                    0.0, starts, True)  # fmt: skip
-    if effect == "command_quantization":
-        slot = replace(slot, comb=True, starts=_TEETH)
-    slot = slot if slide else _bounded(slot, parameter)
-    return slot if figure is None else _known(slot, figure)
-
-
-def _bounded(slot: Slot, parameter: Parameter) -> Slot:
-    """Keeps a coordinate within the range of its parameter."""
-    if slot.kind == "reciprocal":
-        return replace(slot, high=min(slot.high, slot.coordinate(parameter.low)))
-    ends = [slot.coordinate(x) if x != 0.0 or slot.kind == "linear" else slot.low
-            for x in (parameter.low, parameter.high)]  # fmt: skip
-    return replace(slot, low=max(slot.low, ends[0]), high=min(slot.high, ends[1]))
-
-
-def _known(slot: Slot, figure: Nominal) -> Slot:
-    """Places a coordinate at the figure that the simulation has."""
-    absent = figure.value == 0.0 and slot.kind == "linear"
-    base = slot.coordinate(figure.value)
-    if slot.kind == "log":
-        tight = figure.tolerance
-    elif absent:
-        tight = figure.tolerance / slot.scale
-    else:
-        tight = figure.tolerance * abs(base)
-    if slot.unit == "s":
-        tight = max(tight, DELAY_S / slot.scale)
-    starts = slot.starts
-    if slot.kind != "log" and not absent:
-        near = (0.5 * base, 0.8 * base, 1.25 * base, 2.0 * base)
-        starts = near + tuple(u for u in starts if u > base)
-    low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
-    return replace(
-        slot,
-        base=base,
-        low=low,
-        tight=math.inf if figure.free else SIGMA * tight,
-        starts=starts,
-        vanishes=absent or slot.effect in ("stiffness", "damping"),
-    )

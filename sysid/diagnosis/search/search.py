@@ -1,27 +1,27 @@
-"""Which effects does the simulation lack? Fits, held-out scores, forward and backward.
+"""Which effects does the simulation lack? Nested models, forward, backward, exchanged.
 
-Every effect of the catalogue is fitted, from several starts, beside the nuisances. What
-counts is the error on folds that the fit did not see:
-
-    S(M) = Σ_g ‖W r_g(θ̂_{−g})‖² + Σ_i ((θ_i − θ⁰_i) / σ_i)²
-
-with the second sum over the nuisances that stay inside their tolerances σ_i, so that a
-figure far out of its tolerance is a finding and not silently absorbed.
+Every effect of the catalogue is fitted, from several starts, together with the nuisance
+parameters. Models are compared by their error on folds that the fit did not see, with
+the penalty of the priors of the nuisance parameters (`candidate`), so that a parameter
+far off its prior is a finding and not silently absorbed.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.diagnosis.search.candidate import Model, fit_models, gain_nat
+from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
 from sysid.diagnosis.search.coupling import coupled
-from sysid.diagnosis.search.exchange import MOST, exchanged, pruned
 from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.selection import worth
-from sysid.diagnosis.search.stage import extended
+from sysid.diagnosis.search.selection import accepted
+from sysid.diagnosis.search.stage import NESTED_SHARE, extended
+
+MOST = 3
+"""Largest number of causes."""
 
 EXCESS = 1.5
-"""Squared error over the noise above which something may be left to explain."""
+"""Mean squared whitened residual above which something may be unexplained."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,10 +30,10 @@ class Search:
 
     Attributes:
         problem: with the final noise.
-        base: the simulation with its nuisances fitted.
+        base: the nominal model with its nuisance parameters fitted.
         best: the model that is chosen.
-        rivals: for each cause, models in which another effect takes its place, best
-            first.
+        alternatives: for each cause, models in which another effect takes its place,
+            best first.
         without: for each cause, the model without it.
         samples: number of residuals that count.
     """
@@ -41,45 +41,66 @@ class Search:
     problem: Problem
     base: Model
     best: Model
-    rivals: dict[str, list[Model]]
+    alternatives: dict[str, list[Model]]
     without: dict[str, Model]
     samples: int
 
-    def gain(self, worse: Model, better: Model) -> float:
-        """Gain in log predictive density [nat], at the error that remains."""
-        return gain_nat(worse, better, self.samples)
+    def gain(self, cause: str, model: Model | None = None) -> float:
+        """Log-likelihood gain of a model, else the best, over that without a cause."""
+        without = self.without.get(cause, self.base)
+        return log_likelihood_gain(without, model or self.best, self.samples)
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """What was done with one joint; for verdict and report.
+
+    Attributes:
+        track: its measured motion.
+        problem: residuals and weights; None for a joint that did not move.
+        search: what was found; None likewise.
+    """
+
+    track: JointTrack
+    problem: Problem | None
+    search: Search | None
+
+    @property
+    def found(self) -> Search:
+        """The search of a joint that moved."""
+        assert self.search is not None
+        return self.search
 
 
 def search(problem: Problem) -> Search:
     """Runs the whole search on one joint.
 
-    Without repeats it runs again with what the first result leaves as noise.
+    Without repeats it runs again with the residual of the first result as noise.
     """
     problem, base = settled(problem)
     problem = coupled(problem, base)
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found
-    left = problem.raw(found.best.fit.theta[None], weigh=False)[0]
-    problem = problem.with_noise(left)
+    residual = problem.raw(found.best.fit.theta[None], weigh=False)[0]
+    problem = problem.with_noise(residual)
     base = fit_models(problem, [()], [base.fit.theta])[0]
     return _searched(problem, base)
 
 
 def _searched(problem: Problem, base: Model) -> Search:
     """Searches at a given noise."""
-    samples = int(problem.counts().sum())
     best = base
-    rivals: dict[str, list[Model]] = {}
+    alternatives: dict[str, list[Model]] = {}
     for _ in range(MOST):
         stage = extended(problem, best)
-        better = [m for m in stage if worth(problem, best, m, base)]
+        better = [m for m in stage if accepted(problem, best, m, base)]
         if not better:
             break
         winner = _fullest(better)
-        again = _beside(problem, best.effects, winner.fit.theta)
+        again = _refitted(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
-            better = [m for m in better if worth(problem, again, m, base)]
+            better = [m for m in better if accepted(problem, again, m, base)]
             if not better:
                 break
             winner = _fullest(better)
@@ -89,46 +110,109 @@ def _searched(problem: Problem, base: Model) -> Search:
         if best.effects != winner.effects:
             break
         if len(best.effects) == 1:
-            rivals[best.effects[0]] = [m for m in stage if m is not winner]
-    if len(best.effects) == 1 and best.effects[0] in rivals:
+            alternatives[best.effects[0]] = [m for m in stage if m is not winner]
+    if len(best.effects) == 1 and best.effects[0] in alternatives:
         without = {best.effects[0]: base}
     else:
-        best, rivals, without = exchanged(problem, best, base)
-    return Search(problem, base, best, rivals, without, samples)
+        best, alternatives, without = exchanged(problem, best, base)
+    return Search(problem, base, best, alternatives, without, problem.samples)
 
 
 def _fullest(better: list[Model]) -> Model:
-    """Chooses the first effect, or one that explains what the first leaves.
+    """Chooses the first effect, or one that explains the residual of the first.
 
-    Where one moment alone tells a figure, folds without it do not predict that moment,
-    however true the figure is.
+    Where one moment alone excites a parameter, folds without it do not predict that
+    moment, however true the parameter is.
     """
     first, full = better[0], min(better, key=lambda m: m.errors.max())
-    left, rest = first.errors.max() - 1.0, full.errors.max() - 1.0
-    return full if left > EXCESS - 1.0 and rest < 0.5 * left else first
+    remains, rest = first.errors.max() - 1.0, full.errors.max() - 1.0
+    return full if remains > EXCESS - 1.0 and rest < 0.5 * remains else first
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
-    """Fits the nuisances and estimates the noise, twice."""
-    theta = problem.space.base
+    """Fits the nuisance parameters and estimates the noise, in turns."""
+    theta = problem.space.nominal
     for _ in range(3):
         problem = problem.with_noise(problem.raw(theta[None], weigh=False)[0])
-        model = _beside(problem, (), theta)
+        model = _refitted(problem, (), theta)
         theta = model.fit.theta
     return problem, model
 
 
-def _beside(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> Model:
-    """Fits from where a fit is, and from delays beside it; returns the best.
+def _refitted(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> Model:
+    """Fits from where a fit is, and from other delays; returns the best.
 
     Where targets arrive just when readings are taken, the error has a kink, at which a
     fit would stay.
     """
     slots, starts = problem.space.slots, [theta]
     for i in problem.space.of("transport_delay"):
-        for way in (-1.0, 1.0) if 0.0 < slots[i].tight < np.inf else ():
+        for way in (-1.0, 1.0) if 0.0 < slots[i].prior_sd < np.inf else ():
             moved = theta.copy()
-            moved[i] = max(moved[i] + way * slots[i].tight, slots[i].low)
+            moved[i] = max(moved[i] + way * slots[i].prior_sd, slots[i].low)
             starts.append(moved)
     models = fit_models(problem, [effects] * len(starts), starts)
     return min(models, key=lambda m: m.fit.cost)
+
+
+def pruned(problem: Problem, model: Model, base: Model) -> Model:
+    """Drops effects that a larger model no longer needs."""
+    while len(model.effects) > 1:
+        sets = [tuple(e for e in model.effects if e != out) for out in model.effects]
+        smaller = fit_models(problem, sets, [model.fit.theta] * len(sets))
+        best = min(smaller, key=lambda m: m.score)
+        if accepted(problem, best, model, base):
+            return model
+        model = best
+    return model
+
+
+def exchanged(
+    problem: Problem, best: Model, base: Model
+) -> tuple[Model, dict[str, list[Model]], dict[str, Model]]:
+    """Lets other effects take the places of causes while that is better.
+
+    The first cause of several was chosen when it stood for all of them. One that is not
+    accepted together with the others goes.
+
+    Returns:
+        The model, and for each cause its alternatives and the model without it.
+    """
+    samples = problem.samples
+    for _ in range(MOST):
+        others, without = swapped(problem, best, base)
+        idle = [
+            c for c in best.effects if not accepted(problem, without[c], best, base)
+        ]
+        if idle and len(best.effects) > 1:
+            best = without[idle[0]]
+            continue
+        for cause, stage in others.items():
+            gain = log_likelihood_gain(without[cause], best, samples)
+            least = max(3.0, NESTED_SHARE * gain)
+            better = [
+                m
+                for m in stage
+                if log_likelihood_gain(best, m, samples) > least
+                and accepted(problem, without[cause], m, base)
+            ]
+            if better:
+                break
+        else:
+            return best, others, without
+        best = pruned(problem, better[0], base)
+    return best, *swapped(problem, best, base)
+
+
+def swapped(
+    problem: Problem, best: Model, base: Model
+) -> tuple[dict[str, list[Model]], dict[str, Model]]:
+    """Lets every other effect take the place of each cause, and none."""
+    alternatives, without = {}, {}
+    for cause in best.effects:
+        rest = tuple(e for e in best.effects if e != cause)
+        refit = fit_models(problem, [rest], [best.fit.theta])[0] if rest else base
+        without[cause] = refit
+        stage = extended(problem, without[cause])
+        alternatives[cause] = [m for m in stage if cause not in m.effects]
+    return alternatives, without

@@ -1,25 +1,29 @@
-"""One stage of a search: every effect that a model lacks is fitted beside it."""
+"""One stage of the search: every effect that a model lacks is added and fitted."""
 
-import numpy as np
-
-from sysid.diagnosis.replay.link import EFFECTS as LINKED
-from sysid.diagnosis.search.candidate import Model, fit_models, gain_nat
+from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
+from sysid.diagnosis.search.candidate import (
+    Model,
+    at_nominal,
+    fit_models,
+    log_likelihood_gain,
+)
 from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.selection import ALIKE
+from sysid.diagnosis.search.selection import MODEL_ERROR
 from sysid.diagnosis.search.starts import starts_of
 
 REFINED = 3
 """Number of candidates whose fits are continued."""
 
-BENT = 16.0
-"""Penalty of figures above which a fit is also continued from the figures."""
+OFF_PRIOR_PENALTY = 16.0
+"""Penalty of nuisance parameters above which a fit is also continued from nominal."""
 
 NESTED = {"coulomb_friction": ("stribeck_friction", "hysteresis")}
-"""Effects that become another one at an end of their shape: they are not its rivals."""
+"""Effects that become another one at an end of their shape: they contain it, and are no
+alternatives to it."""
 
-NEARLY = 0.015
-"""Share of a gain that does not decide between an effect and one that becomes it: what
-gives in dry friction before it slips is less than an encoder tells."""
+NESTED_SHARE = 0.015
+"""Share of a gain that does not decide between an effect and one that contains it: what
+gives in dry friction before it slips is less than an encoder resolves."""
 
 
 def extended(problem: Problem, model: Model) -> list[Model]:
@@ -39,17 +43,21 @@ def extended(problem: Problem, model: Model) -> list[Model]:
 
 
 def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:
-    """Tells whether an effect can act beside others: one thing moves the link."""
-    taken = effect in LINKED and any(e in LINKED for e in effects)
+    """Whether an effect can act with others: only one thing moves the link."""
+    taken = effect in LINK_EFFECTS and any(e in LINK_EFFECTS for e in effects)
     return effect not in effects and not taken
 
 
 def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
-    """Goes on with the fits that are nearest to the records; best first."""
-    samples = int(problem.counts().sum())
+    """Continues the fits that are nearest to the records; best first.
+
+    Masses, loads and rotors that a large effect has moved off their priors compensate
+    each other: from there every step leaves a narrow, curved valley. So those fits are
+    continued from nominal too.
+    """
 
     def order(m: Model) -> float:
-        return -gain_nat(smaller, m, samples)
+        return -log_likelihood_gain(smaller, m, problem.samples)
 
     near = sorted(stage, key=lambda m: m.fit.cost)[:REFINED]
     ranked = sorted(stage, key=order)
@@ -57,23 +65,15 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     close = ranked[:REFINED] + [m for m in ranked[REFINED:] if order(m) < far]
     near += [m for m in close if m not in near]
     jobs = [(m.effects, m.fit.theta) for m in near]
-    jobs += [(m.effects, _unbent(problem, m)) for m in near if m.penalty > BENT]
+    jobs += [
+        (m.effects, at_nominal(problem, m))
+        for m in near
+        if m.penalty > OFF_PRIOR_PENALTY
+    ]
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=10)
     models = sorted(models, key=lambda m: -m.fit.cost)
     again = {m.effects: m for m in models}  # the last one is the best
     return sorted((again.get(m.effects, m) for m in stage), key=order)
-
-
-def _unbent(problem: Problem, model: Model) -> np.ndarray:
-    """Returns where a fit is, but with the figures of the simulation as they stand.
-
-    Masses, loads and rotors that a large effect has bent make up for each other: from
-    there no step leads back that does not leave a narrow, curved valley.
-    """
-    theta = problem.space.base.copy()
-    kept = [i for e in model.effects for i in problem.space.of(e)]
-    theta[kept] = model.fit.theta[kept]
-    return theta
 
 
 def _simplest_first(
@@ -82,17 +82,17 @@ def _simplest_first(
     """Puts the effect with the fewest parameters first among those that tie."""
     if not stage:
         return stage
-    samples = int(problem.counts().sum())
-    gains = {m.effects: gain_nat(smaller, m, samples) for m in stage}
+    samples = problem.samples
+    gains = {m.effects: log_likelihood_gain(smaller, m, samples) for m in stage}
     most, best = gains[stage[0].effects], stage[0].effects[-1]
 
     def tie(m: Model) -> bool:
         behind = most - gains[m.effects]
         if best not in NESTED.get(m.effects[-1], ()):
-            return behind < max(3.0, ALIKE * most)
-        # What the equation leaves of large friction is not that it falls with speed.
-        left = gain_nat(m, stage[0], samples)
-        return behind < max(3.0, NEARLY * most) or left < ALIKE * most
+            return behind < max(3.0, MODEL_ERROR * most)
+        # The model error of large friction is no sign that it falls with speed.
+        lacks = log_likelihood_gain(m, stage[0], samples)
+        return behind < max(3.0, NESTED_SHARE * most) or lacks < MODEL_ERROR * most
 
     tied = [m for m in stage if tie(m)]
     first = min(

@@ -6,39 +6,40 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal import lfilter
 
-from sysid.diagnosis.replay.residuals import EVERY, TAPS
-from sysid.diagnosis.search.candidate import Model, bent
+from sysid.diagnosis.replay.band import EVERY, TAPS
+from sysid.diagnosis.search.candidate import Model, at_nominal, off_prior
 from sysid.diagnosis.search.problem import LANES, Problem
 
-COMB = (0.02, 0.002)
-"""Logarithms around the best start within which a comb of optima is searched."""
+AROUND = (0.02, 0.002)
+"""Logarithms around the best start within which local optima are searched."""
 
-MOST_TEETH = 6e7
+MOST_GRIDS = 6e7
 """Largest number of grids that are tried, times that of the targets."""
 
-GONE = 2.0
-"""Prior deviations by which a figure has gone far."""
+FAR_SD = 2.0
+"""Prior standard deviations from nominal from which a fit goes on where it is."""
 
-TEETH = 16
-"""Number of steps of a grid whose starts are tried in the whole chain."""
+OPTIMA = 16
+"""Number of local optima of a grid whose starts are tried in the whole chain."""
 
 
 def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str, list]:
-    """Returns the best starts of every effect: near the model, and from the figures.
+    """Returns the best starts of every effect: near the model, and from nominal.
 
-    A start counts by the error that is left when the nuisances follow it linearly. One
-    that changes nothing, a limit that the record does not reach, comes last: from there
-    no slope leads anywhere. A figure that has already gone far goes on from there.
+    A start counts by the error that remains when the nuisance parameters follow it
+    linearly. One that changes nothing, a limit that the record does not reach, comes
+    last: it has no gradient. A parameter that is already far off its prior goes on from
+    there.
     """
     result: dict[str, list] = {name: [] for name in names}
     for name in names:
-        if bent(problem, model, name) > GONE:
+        if off_prior(problem, model, name) > FAR_SD:
             result[name].append(model.fit.theta)
-    fitted, nominal = model.fit.theta, problem.space.base.copy()
-    kept = [i for e in model.effects for i in problem.space.of(e)]
-    nominal[kept] = fitted[kept]
+    fitted, nominal = model.fit.theta, at_nominal(problem, model)
     for origin, count in ((fitted, 2), (nominal, 1)):
-        some = names if count == 2 else [n for n in names if not _comb(problem, n)]
+        some = (
+            names if count == 2 else [n for n in names if not _many_optima(problem, n)]
+        )
         owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
         thetas = np.stack([origin, *(t for _, t in owned)])
         rest, *costs = _linear_costs(problem, model, thetas)
@@ -53,11 +54,11 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
 
 def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
     """Returns the coordinates that are tried for an effect."""
-    if not _comb(problem, name):
+    if not _many_optima(problem, name):
         return [_placed(origin, start) for start in problem.space.starts(name)]
     index = problem.space.of(name)[0]
-    starts = [_placed(origin, {index: u}) for u in _teeth(problem, origin, index)]
-    for spread in COMB:
+    starts = [_placed(origin, {index: u}) for u in _grid_optima(problem, origin, index)]
+    for spread in AROUND:
         costs = _linear_costs(problem, model, np.stack(starts))
         best = starts[int(np.argmin(costs))]
         for factor in np.exp(np.linspace(-spread, spread, 31)):
@@ -73,20 +74,20 @@ def _placed(origin: np.ndarray, start: dict[int, float]) -> np.ndarray:
     return theta
 
 
-def _teeth(
+def _grid_optima(
     problem: Problem, origin: Float[np.ndarray, " n"], index: int
 ) -> Float[np.ndarray, " k"]:
     """Returns coordinates of grids near which the commands' optima lie.
 
     With largest target u, grids Δ and Δ' agree on it while |u / Δ − u / Δ'| is well
     below ½. So close together thousands are tried, and not in the whole chain but by
-    how much what is left looks like the rounding behind delay and low-pass.
+    the correlation of the residual with the rounding behind delay and low-pass.
     """
     slot, track = problem.space.slots[index], problem.data.track
     targets = np.asarray(track.held, float)[:, -1]
     ends = [slot.scale * u for u in (slot.starts[-1], slot.starts[0])]
     count = 8.0 * np.abs(targets).max() * (1.0 / ends[1] - 1.0 / ends[0]) + 2.0
-    most = max(MOST_TEETH / targets.size, 1e3)
+    most = max(MOST_GRIDS / targets.size, 1e3)
     grids = 1.0 / np.linspace(1.0 / ends[0], 1.0 / ends[1], int(min(count, most)))
     values, _ = problem.space.values(origin[None])
     delay = values["transport_delay"]["delay_s"][0] / problem.data.dt
@@ -94,7 +95,7 @@ def _teeth(
         -2.0 * np.pi * values["lowpass_cutoff"]["cutoff_hz"][0] * problem.data.dt
     )
     raw = problem.raw(origin[None])
-    left = problem.whitened(raw)[0]
+    residual = problem.whitened(raw)[0]
     seen = 0 if problem.valid[0].any() else 1
     gain = np.asarray(track.kp) * (2.0 * seen - 1.0) * problem.weight[seen]
     likeness = []
@@ -107,8 +108,8 @@ def _teeth(
         moved[:, seen] = gain * _banded(smooth, delay + 0.5, raw.shape[2])
         shown = problem.whitened(np.where(problem.valid, moved, 0.0))
         size = np.sqrt(np.sum(shown**2, 1))
-        likeness.append(-shown @ left / np.maximum(size, 1e-12))
-    best = np.argsort(-np.concatenate(likeness))[:TEETH]
+        likeness.append(-shown @ residual / np.maximum(size, 1e-12))
+    best = np.argsort(-np.concatenate(likeness))[:OPTIMA]
     return grids[best] / slot.scale
 
 
@@ -123,17 +124,17 @@ def _banded(x: np.ndarray, delay: float, count: int) -> Float[np.ndarray, "c m p
     return np.sum(parts, 0)
 
 
-def _comb(problem: Problem, name: str) -> bool:
-    return problem.space.slots[problem.space.of(name)[0]].comb
+def _many_optima(problem: Problem, name: str) -> bool:
+    return problem.space.slots[problem.space.of(name)[0]].many_optima
 
 
 def _linear_costs(problem: Problem, model: Model, thetas: np.ndarray) -> np.ndarray:
-    """Returns the errors that are left when the nuisances follow linearly."""
+    """Returns the errors that remain when the nuisance parameters follow linearly."""
     rs = problem.residual(thetas)
     fit, space = model.fit, problem.space
-    deviation = space.deviations(model.effects)[fit.free]
-    j = np.concatenate([fit.jacobian, np.diag(1.0 / deviation)])
-    center = (thetas - space.base)[:, fit.free] / deviation
+    prior_sd = space.prior_sds(model.effects)[fit.free]
+    j = np.concatenate([fit.jacobian, np.diag(1.0 / prior_sd)])
+    center = (thetas - space.nominal)[:, fit.free] / prior_sd
     full = np.concatenate([rs, center], 1)
     q, _ = np.linalg.qr(j)
     cost = np.sum(full**2, 1) - np.sum((full @ q) ** 2, 1)

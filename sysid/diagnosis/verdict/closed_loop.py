@@ -1,4 +1,4 @@
-"""Closed-loop simulation of one joint along its records: what the user sees.
+"""Closed-loop simulation of one joint along its records: for display.
 
 The candidate follows the targets by itself: chain and joint are integrated from the
 measured start of every piece, at substeps of at most a millisecond and a quarter.
@@ -13,39 +13,41 @@ from jaxtyping import Array, Float
 
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
-from envs.actuator.surroundings import Gravity, Surroundings
 from sysid.diagnosis.replay.command import command_path
-from sysid.diagnosis.replay.residuals import KINDS, Track
+from sysid.diagnosis.replay.effects import KINDS
+from sysid.diagnosis.replay.model import Nuisance
+from sysid.diagnosis.replay.motion import Track, motion_of, with_candidates
+from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.search.problem import Problem
 
 SUBSTEP_S = 0.00125
-_ROWS = (
-    "pos",
-    "push",
-    "ext",
-    "inertia",
-    "moment",
-    "turned",
-    "payload_moment",
-    "payload_shift",
-    "payload_inertia",
-    "others_nm",
-    "other_q",
-    "other_nm",
-)
+"""Longest substep of the simulation [s]."""
 
 
 def simulated(
     problem: Problem, thetas: Float[np.ndarray, "c n"]
 ) -> Float[np.ndarray, "c t p"]:
-    """Returns the encoder angles of candidates at the steps of the grid."""
+    """Encoder angles y of candidates that follow the targets from a measured start.
+
+        (μ I + J) q̈ = τ + τ_load − b q̇ − F sign q̇,   y = f(q)
+
+    Args:
+        problem: the joint's track and coordinates.
+        thetas: coordinates of candidates [1].
+
+    Returns:
+        y at the steps of the grid [rad].
+
+    Source:
+        Output error of the same model, for display: L. Ljung, System Identification:
+        Theory for the User, 1999, section 4.2; integration: `envs.actuator.joint`.
+    """
     substeps = max(1, int(np.ceil(problem.data.dt / SUBSTEP_S)))
     params, nuisance = problem.space.values(thetas)
     angles = _closed_loop(
         problem.data.track,
         params,
-        nuisance["mass"],
-        nuisance["push_gain"],
+        nuisance,
         problem.data.dt / substeps,
         substeps,
         problem.space.effects,
@@ -57,8 +59,7 @@ def simulated(
 def _closed_loop(
     track: Track,
     params: dict[str, dict[str, Float[Array, " c"]]],
-    mass: Float[Array, " c"],
-    pushed: Float[Array, " c"],
+    nuisance: Nuisance,
     dt: float,
     substeps: int,
     names: tuple[str, ...],
@@ -70,40 +71,20 @@ def _closed_loop(
         for n in names
         if n in KINDS
     )
-    mass, pushed = mass[None, :], pushed[None, :]
+    mass, pushed = nuisance.mass[None, :], nuisance.push_gain[None, :]
     kp, kd = track.kp[:, None], track.kd[:, None]
 
     def substep(carry, now, target):
         states, q, qd, _ = carry
-        away = q - now["pos"]
-        moment = mass[..., None] * (
-            jnp.cos(away)[..., None] * now["moment"]
-            + jnp.sin(away)[..., None] * now["turned"]
-        )
-        gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
-        load = now["push"] + pushed * now["ext"] + jnp.sum(moment * gravity, -1)
-        around = Surroundings(
-            others_nm=now["others_nm"],
-            other_q=now["other_q"],
-            other_nm=now["other_nm"],
-            gravity=Gravity(
-                gravity=gravity,
-                moment=moment,
-                payload_kg=jnp.broadcast_to(track.payload_kg[:, None], q.shape),
-                payload_moment=now["payload_moment"],
-                payload_shift=now["payload_shift"],
-                payload_inertia=now["payload_inertia"],
-            ),
-        )
+        around, load = surroundings_at(track, now, q - now.pos, mass, pushed)
         joint = JointInput(target, q, qd, load, kp, kd, around)
         states, x = chain_step(model, states, joint, dt)
-        q, qd = joint_step(x, mass * now["inertia"], dt)
+        q, qd = joint_step(x, mass * now.inertia, dt)
         return states, q, qd, x.encoder
 
     def step(carry, row):
-        inner, last = carry
-        row, target = row
-        now = {k: v[:, None] for k, v in row.items()}
+        (inner, last), (motion, target) = carry, row
+        now = with_candidates(motion)
 
         def some(i, inner):
             return substep(inner, now, last + (i + 1) / substeps * (target - last))
@@ -111,8 +92,8 @@ def _closed_loop(
         inner = jax.lax.fori_loop(0, substeps, some, inner)
         return (inner, target), inner[3]
 
-    rows = {k: getattr(track, k) for k in _ROWS}
-    first = {k: v[0][:, None] for k, v in rows.items()}
-    q0 = jnp.broadcast_to(first["pos"], (first["pos"].shape[0], mass.shape[1]))
+    motion = motion_of(track)
+    pos = motion.pos[0][:, None]
+    q0 = jnp.broadcast_to(pos, (pos.shape[0], mass.shape[1]))
     inner = (init_states(model, path[0], q0, dt), q0, jnp.zeros_like(q0), q0)
-    return jax.lax.scan(step, (inner, path[0]), (rows, path))[1]
+    return jax.lax.scan(step, (inner, path[0]), (motion, path))[1]

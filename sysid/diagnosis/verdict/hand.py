@@ -11,7 +11,7 @@ from envs.hand.quantity import JointQuantity, Quantity
 from sysid.mechanism import Mechanism, hand_mechanism
 from sysid.result import Cause, Diagnosis, Estimate
 
-_FIGURES = {
+_WHOLE_HAND = {
     "transport_delay": ("delay_s", "delay_s"),
     "lowpass_cutoff": ("lowpass_hz", "cutoff_hz"),
 }
@@ -24,7 +24,7 @@ _PER_JOINT = {
 
 
 def extended_hand(hand: HandFile, diagnosis: Diagnosis) -> HandFile:
-    """Returns the hand with the causes: figures replaced, other effects added.
+    """Returns the hand with the causes: nominal values replaced, other effects added.
 
     Args:
         hand: the hand file of the simulation that was compared.
@@ -44,10 +44,10 @@ def _with_cause(
     hand: HandFile, cause: Cause, mechanism: Mechanism, source: str
 ) -> HandFile:
     """Adds one cause."""
-    if cause.effect in _FIGURES and cause.where == "all":
-        name, parameter = _FIGURES[cause.effect]
-        figure = _quantity(cause.parameters[parameter], source)
-        return dataclasses.replace(hand, **{name: figure})
+    if cause.effect in _WHOLE_HAND and cause.where == "all":
+        name, parameter = _WHOLE_HAND[cause.effect]
+        quantity = _quantity(cause.parameters[parameter], source)
+        return dataclasses.replace(hand, **{name: quantity})
     if cause.effect in _PER_JOINT:
         return _scaled(hand, cause, mechanism, source)
     found = {
@@ -56,7 +56,7 @@ def _with_cause(
     }
     whole = CATALOGUE[cause.effect].scope == "hand"
     if whole and cause.effect in (effect.name for effect in hand.effects):
-        return hand  # the joint that shows it best has told it
+        return hand  # added by the joint that shows it best
     where = "all" if whole else cause.where
     added = Effect(cause.effect, found, (where,), cause.other)
     return dataclasses.replace(hand, effects=(*hand.effects, added))
@@ -79,7 +79,7 @@ def _changed(estimate: Estimate, change: Callable[[float], float]) -> Estimate:
 
 
 def _within(effect: str, name: str, estimate: Estimate, source: str) -> Quantity:
-    """Returns a figure inside the range that training takes, and says if it was not."""
+    """Returns a value within the range that training takes, noted if it was not."""
     parameter = CATALOGUE[effect].parameters[name]
 
     def clipped(x: float) -> float:
@@ -100,7 +100,7 @@ def _within(effect: str, name: str, estimate: Estimate, source: str) -> Quantity
 def _scaled(
     hand: HandFile, cause: Cause, mechanism: Mechanism, source: str
 ) -> HandFile:
-    """Changes a figure that every joint has of its own."""
+    """Changes a value that every joint has of its own."""
     name, parameter = _PER_JOINT[cause.effect]
     old: JointQuantity = getattr(hand, name)
     estimate = cause.parameters[parameter]
@@ -127,6 +127,6 @@ def _scaled(
 
 
 def _quantity(estimate: Estimate, source: str) -> Quantity:
-    """Returns an estimate as a figure of a hand file."""
+    """Returns an estimate as a quantity of a hand file."""
     value, low, high = estimate.value, estimate.low, estimate.high
     return Quantity(value, estimate.unit, source, min(low, value), max(high, value))

@@ -1,20 +1,24 @@
-"""What the causes gain on folds that no fit saw, and what no model can remove."""
+"""What the causes remove of the error on held-out folds, and the noise floor."""
 
 from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.replay.residuals import sample_rows
+from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.search.candidate import Model, fit_models
-from sysid.diagnosis.search.parameters import SIGMA, Space
+from sysid.diagnosis.search.parameters import Space
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.search.space import SIGMA
 from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Gain
 
 BLOCKS = 24
+"""Number of blocks of time that the bootstrap draws from."""
+
 DRAWS = 400
+"""Number of bootstrap samples."""
 
 
 def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str, Gain]:
@@ -39,22 +43,25 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
 
 
 def within_tolerances(problem: Problem, base: Model) -> Model:
-    """Fits the figures of the simulation again, none of them beyond its tolerance.
+    """Fits the nominal parameters again, none of them beyond its tolerance.
 
-    A search lets them go further, at a price; but an error that a figure out of its
-    tolerance would hide is there before the cause is known.
+    A search lets them go further, at a penalty; but an error that a parameter out of
+    its tolerance would hide is there before the cause is known.
     """
     slots = []
     for slot in problem.space.slots:
-        reach = slot.tight / SIGMA if slot.tight > 0.0 else np.inf
-        low, high = max(slot.low, slot.base - reach), min(slot.high, slot.base + reach)
+        reach = slot.prior_sd / SIGMA if slot.prior_sd > 0.0 else np.inf
+        low, high = (
+            max(slot.low, slot.nominal - reach),
+            min(slot.high, slot.nominal + reach),
+        )
         slots.append(replace(slot, low=low, high=high))
     bounded = replace(problem, space=Space(tuple(slots)))
     return fit_models(bounded, [()], [base.fit.theta])[0]
 
 
 def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, "m p"]:
-    """Residual of every sample with the parameters that were found without its fold."""
+    """Residual of every sample at the parameters estimated without its fold."""
     raw = problem.raw(model.fold_theta)[:, channel]
     return np.take_along_axis(raw, problem.fold[None], 0)[0]
 

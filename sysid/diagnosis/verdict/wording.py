@@ -1,43 +1,50 @@
 """The words of a diagnosis: warnings, what to record next, and the summary."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.search.search import Search
+from sysid.result import Alternative, Cause, Gain, Verdict
 
 
 def warnings_of(found: Search) -> list[str]:
-    """Tells bounds met and figures far out of their tolerance."""
+    """Names bounds that were met and nominal parameters far off their priors."""
     slots, fit = found.problem.space.slots, found.best.fit
     joint = found.problem.data.joint
     texts = [
-        f"{joint}: {slots[i].effect}.{slots[i].name} met its bound"
+        f"{joint}: {slots[i].label} met its bound"
         for i in fit.bounded
         if slots[i].effect in found.best.effects
     ]
     for i in fit.free:
         slot = slots[i]
-        if slot.effect in found.best.effects or not np.isfinite(slot.tight):
+        if slot.effect in found.best.effects or not np.isfinite(slot.prior_sd):
             continue
-        away = abs(fit.theta[i] - slot.base) / slot.tight
+        away = slot.shift(fit.theta[i])
         if away > 4.0:
-            name = f"{slot.effect}.{slot.name}".lstrip(".")
-            texts.append(f"{joint}: {name} lies {away:.0f} tolerances from its figure")
+            how_far = f"{away:.0f} prior standard deviations"
+            texts.append(f"{joint}: {slot.label} lies {how_far} from nominal")
     if not found.problem.repeat:
         texts.append(f"{joint}: no repeats, so the noise floor is not known")
     return texts
 
 
-def next_experiment(verdict, causes, rivals, blind) -> str:
+def next_experiment(
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    alternatives: Sequence[Alternative],
+    blind: Sequence[str],
+) -> str:
     """Proposes what to record next."""
     if verdict == "ambiguous":
-        nearest = next(r for r in rivals if not r.distinguishable)
-        rival, first = nearest.effect, nearest.cause or causes[0].effect
-        hint = CATALOGUE[first].confusable_with.get(rival) or CATALOGUE[
-            rival
-        ].confusable_with.get(first)
+        nearest = next(a for a in alternatives if not a.distinguishable)
+        other, first = nearest.effect, nearest.cause or causes[0].effect
+        hint = CATALOGUE[first].confusable_with.get(other)
+        hint = hint or CATALOGUE[other].confusable_with.get(first)
         hint = hint or "another gain of the controller, and another load"
-        return f"To tell {first} from {rival}: {hint}."
+        return f"To distinguish {first} from {other}: {hint}."
     if verdict == "unexplained":
         return (
             "Repeat one motion three times alone, slowly and fast, with and without "
@@ -52,7 +59,14 @@ def next_experiment(verdict, causes, rivals, blind) -> str:
     return ""
 
 
-def summary_of(verdict, causes, alternatives, gain, blind, left) -> str:
+def summary_of(
+    verdict: Verdict,
+    causes: Sequence[Cause],
+    alternatives: Sequence[Alternative],
+    gain: Gain | None,
+    blind: Sequence[str],
+    signs: Sequence[str],
+) -> str:
     """Says the verdict in two sentences."""
     if verdict == "none":
         return "The simulation agrees with the records within noise and tolerances."
@@ -63,7 +77,7 @@ def summary_of(verdict, causes, alternatives, gain, blind, left) -> str:
             f"shown {shown}."
         )
     if verdict == "unexplained" and not causes:
-        return "Something is there that no known effect explains: " + "; ".join(left)
+        return "Something is there that no known effect explains: " + "; ".join(signs)
     names = " and ".join(f"{c.effect} ({c.where})" for c in causes)
     share = ""
     if gain is not None:
@@ -79,12 +93,12 @@ def summary_of(verdict, causes, alternatives, gain, blind, left) -> str:
     return f"The simulation lacks {names}.{share}"
 
 
-def _instead(alternatives) -> str:
+def _instead(alternatives: Sequence[Alternative]) -> str:
     """Says which effects may stand in the place of which causes."""
     same: dict[str, list[str]] = {}
-    for rival in alternatives:
-        if not rival.distinguishable:
-            same.setdefault(rival.cause, []).append(rival.effect)
+    for a in alternatives:
+        if not a.distinguishable:
+            same.setdefault(a.cause, []).append(a.effect)
     return " and ".join(
         f"one of {', '.join(effects)} instead of {cause}"
         for cause, effects in same.items()

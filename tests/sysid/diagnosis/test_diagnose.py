@@ -36,8 +36,8 @@ def found_in(case):
 
 
 def names_of(said):
-    rivals = {a.effect for a in said.alternatives if not a.distinguishable}
-    return {c.effect for c in said.causes[:1]} | rivals
+    same = {a.effect for a in said.alternatives if not a.distinguishable}
+    return {c.effect for c in said.causes[:1]} | same
 
 
 def test_a_part_of_the_battery():

@@ -16,10 +16,11 @@ from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.measured.resampling import held_targets, shares, smoothed
 from sysid.diagnosis.measured.segments import grid_step_s, pieces_of
 from sysid.diagnosis.replay.command import WITHIN, command_path
-from sysid.diagnosis.replay.link import link_step, spring_noise
+from sysid.diagnosis.replay.link import Link, LinkForce, link_step
+from sysid.diagnosis.replay.noise import spring_noise_gain
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.parameters import make_space
 from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.space import make_space
 from sysid.logs.log import make_log
 from sysid.mechanism import JointDrive, Nominal, hand_mechanism, model_mechanism
 
@@ -95,13 +96,13 @@ def test_a_servo_that_is_off_has_no_target():
     assert off.valid[50:390, 0].all()
     assert not off.valid[402:, 0].any()
     rows = np.repeat(t_s, 2)
-    told = np.where(np.arange(len(rows)) % 2 == 0, np.repeat(cmd, 2), np.nan)
+    sent = np.where(np.arange(len(rows)) % 2 == 0, np.repeat(cmd, 2), np.nan)
     read = np.where(np.arange(len(rows)) % 2 == 1, np.sin(rows), np.nan)
-    on = pieces_of(log_of(rows, told, read), 0, {"knee": DRIVE}, 0.005)[0]
+    on = pieces_of(log_of(rows, sent, read), 0, {"knee": DRIVE}, 0.005)[0]
     assert on.valid[402:780, 0].all()
 
 
-def test_a_target_that_nobody_saw_acts_until_it_is_reached():
+def test_a_target_between_rows_acts_until_it_is_reached():
     """Rows are missing in which the target jumps by 1 rad, at 2 rad/s at most."""
     t_s = np.delete(np.arange(0.0, 6.0, 0.005), slice(400, 410))
     log = log_of(t_s, np.where(t_s < 2.02, 0.0, 1.0), np.sin(t_s))
@@ -163,7 +164,7 @@ def test_coordinates_and_identity():
     mechanism = stand(effects={"slew_limit": {"speed_rad_s": Nominal(3.0)}})
     track = all_tracks([log_of(t_s, q, q)], mechanism)[0]
     space = make_space(track, mechanism.drives["knee"], {"others_nm": True})
-    params, _ = space.values(space.base[None])
+    params, _ = space.values(space.nominal[None])
     for effect in space.effects:
         for name, value in CATALOGUE[effect].identity().items():
             if CATALOGUE[effect].parameters[name].identity is not None:
@@ -192,31 +193,31 @@ def test_a_torque_that_acts_late_is_no_friction():
     """A servo holds its torque for a cycle, which `hold_s` makes good."""
     t_s, age = np.arange(0.0, 6.0, 0.005), 5e-4
     q = 0.3 * np.sin(2.0 * np.pi * 3.0 * t_s)
-    # The torque that is told acts so much later.
+    # The torque that is logged acts so much later.
     angle = 0.3 * np.sin(2.0 * np.pi * 3.0 * (t_s + age))
     acc = -((2.0 * np.pi * 3.0) ** 2) * angle
     tau = 2.1e-3 * acc + 0.2 * 9.81 * 0.1 * np.sin(q)
     mechanism, log = stand(), log_of(t_s, q, q, tau=tau)
     problem = problem_of(all_tracks([log], mechanism)[0], [log], mechanism, False)
-    theta = np.stack([problem.space.base] * 2)
+    theta = np.stack([problem.space.nominal] * 2)
     names = [s.name for s in problem.space.slots]
     theta[1, names.index("hold_s")] = age / 1e-3
     plain, held = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
     assert held < 0.35 * plain
 
 
-def test_an_angle_that_is_told_too_small_is_not_late():
+def test_an_angle_that_is_read_too_small_is_not_late():
     """Behind an encoder of scale 0.6 a motion at 2 Hz, half a radian wide."""
     t_s, scale, rate = np.arange(0.0, 6.0, 0.005), 0.6, 2.0 * np.pi * 2.0
     q = 0.5 * np.sin(rate * t_s)
     tau = -2.1e-3 * rate**2 * q + 0.2 * 9.81 * 0.1 * np.sin(q)
     mechanism, log = stand(), log_of(t_s, q, scale * q, tau=tau)
     problem = problem_of(all_tracks([log], mechanism)[0], [log], mechanism, False)
-    theta = np.stack([problem.space.base] * 2)
+    theta = np.stack([problem.space.nominal] * 2)
     (at,) = problem.space.of("encoder_scale")
     theta[1, at] = problem.space.slots[at].coordinate(scale)
-    plain, told = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
-    assert told < 0.01 * plain
+    plain, scaled = np.sqrt(np.mean(problem.raw(theta, weigh=False)[:, 1] ** 2, (1, 2)))
+    assert scaled < 0.01 * plain
 
 
 def test_a_fit_leaves_the_kink_of_a_delay():
@@ -229,10 +230,10 @@ def test_a_fit_leaves_the_kink_of_a_delay():
     track = next(t for t in all_tracks(logs, mechanism) if t.joint == case.joint)
     problem = problem_of(track, logs, mechanism, False)
     (at,) = problem.space.of("transport_delay")
-    figure = problem.space.slots[at]
-    assert figure.value(problem.space.base[at]) == pytest.approx(4.0 * track.dt)
+    slot = problem.space.slots[at]
+    assert slot.value(problem.space.nominal[at]) == pytest.approx(4.0 * track.dt)
     delay_s = case.truth.joints[case.stand.names.index(case.joint)].delay_s
-    found = figure.value(settled(problem)[1].fit.theta[at])
+    found = slot.value(settled(problem)[1].fit.theta[at])
     assert found == pytest.approx(delay_s, abs=3e-4)
     assert abs(4.0 * track.dt - delay_s) > 6e-4
 
@@ -257,35 +258,35 @@ def test_a_link_flies_through_its_play():
     dt, inertia, rise, gap = 0.005, 1e-3, 0.5, 0.5
     one = jnp.ones((1, 1))
     state = (-0.5 * gap * one, 0.0 * one)
-    pull = loose = 0.0 * one
+    link, torque = Link(inertia * one, gap * one, 0.0 * one), 0.0
     for k in range(1, 51):
         force = rise * k * dt * one
-        link = (force, force, force, inertia * one, gap * one, 0.0 * one, dt)
-        state, pull, loose = link_step(state, *link)
+        state, pull = link_step(state, LinkForce(force, force, force), link, dt)
+        torque = float((pull.smoothed + pull.sharp)[0, 0])
         if k == 20:
             way = float(state[0][0, 0]) + 0.5 * gap
             assert way == pytest.approx(rise * (k * dt) ** 3 / 6.0 / inertia, rel=0.01)
-            assert float((pull + loose)[0, 0]) == pytest.approx(0.0, abs=1e-6)
+            assert torque == pytest.approx(0.0, abs=1e-6)
     assert float(state[0][0, 0]) == pytest.approx(0.5 * gap)
-    assert float((pull + loose)[0, 0]) == pytest.approx(rise * 50 * dt)
+    assert torque == pytest.approx(rise * 50 * dt)
 
 
 def test_a_link_rests_at_a_wall_while_the_motor_pushes_it():
     """Noise of the motor's acceleration does not throw it off."""
     one = jnp.ones((1, 1))
-    state, gap = (0.01 * one, 0.0 * one), 0.02 * one
-    noisy, pushed, rest = -0.3 * one, 0.1 * one, (1e-3 * one, gap, 0.0 * one, 0.005)
-    state, pull, loose = link_step(state, pushed, noisy, pushed, *rest)
+    state, noisy, pushed = (0.01 * one, 0.0 * one), -0.3 * one, 0.1 * one
+    link = Link(1e-3 * one, 0.02 * one, 0.0 * one)
+    state, pull = link_step(state, LinkForce(pushed, noisy, pushed), link, 0.005)
     assert float(state[1][0, 0]) == 0.0
-    assert float((pull + loose)[0, 0]) == pytest.approx(0.1)
-    state, _, _ = link_step(state, pushed, noisy, -pushed, *rest)
+    assert float((pull.smoothed + pull.sharp)[0, 0]) == pytest.approx(0.1)
+    state, _ = link_step(state, LinkForce(pushed, noisy, -pushed), link, 0.005)
     assert float(state[1][0, 0]) == pytest.approx(-0.3 / 1e-3 * 0.005)
 
 
-def test_a_spring_shakes_in_the_noise_of_its_motor():
+def test_a_spring_amplifies_the_noise_of_its_motor():
     link, rotor = 2e-3 * jnp.ones((1, 3)), 1e-3 * jnp.ones((1, 3))
     soft = jnp.array([[0.0, 1e-6, 0.05]])
-    loud = spring_noise(link, rotor, soft, jnp.array(1e-4), jnp.array(1e-3), 0.02)
-    assert float(loud[0, 0]) == 1.0
-    assert float(loud[0, 1]) == pytest.approx(1.0, abs=0.01)
-    assert float(loud[0, 2]) > 1.3
+    gain = spring_noise_gain(link, rotor, soft, jnp.array(1e-4), jnp.array(1e-3), 0.02)
+    assert float(gain[0, 0]) == 1.0
+    assert float(gain[0, 1]) == pytest.approx(1.0, abs=0.01)
+    assert float(gain[0, 2]) > 1.3

@@ -53,8 +53,8 @@ def band(residual, kept, width):
 def test_emps():
     """Direction-dependent viscous friction; the pulses record tests it.
 
-    Its errors depend on the band in which they are looked at. They are told in that in
-    which the published model leaves 2.15 N.
+    Its errors depend on the band in which they are looked at. They are reported in that
+    in which the published model leaves 2.15 N.
     """
     said, examined = examine(load_emps(Path(REAL) / "emps"), axis())
     assert said.verdict == "found"

@@ -1,4 +1,4 @@
-"""Records whose rows are too far apart for a motion: what the rests tell."""
+"""Records whose rows are too far apart for a motion: what the rests show."""
 
 import numpy as np
 import pytest

@@ -12,10 +12,11 @@ from benchmarks.diagnosis.hidden.sampling import Noise
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
-from sysid.diagnosis.replay.residuals import BAND_STEPS, EVERY
-from sysid.diagnosis.replay.track import all_tracks, band_noise
+from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
+from sysid.diagnosis.replay.noise import band_noise
+from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.search import Search, settled
-from sysid.diagnosis.verdict.verdict import blind_effects
+from sysid.diagnosis.verdict.observability import blind_effects
 
 
 @pytest.mark.parametrize("whitening", [(), (0.56, -0.2, 0.15, -0.1)])
@@ -26,17 +27,17 @@ def test_noise_is_as_large_as_the_filters_leave_it(whitening):
     found = []
     for order in range(3):
         y = smoothed(x, width, order)[::EVERY] / 0.005**order
-        rest = y.copy()
+        white = y.copy()
         for k, a in enumerate(whitening, 1):
-            rest[k:] -= a * y[:-k]
-        found.append(rest[8:-8].std())
-    told = band_noise((2.0, 2.0), 0.005, whitening)
-    assert told[:3] == pytest.approx(found, rel=0.02)
-    assert told[3] == told[0]
+            white[k:] -= a * y[:-k]
+        found.append(white[8:-8].std())
+    expected = band_noise((2.0, 2.0), 0.005, whitening)
+    assert expected[:3] == pytest.approx(found, rel=0.02)
+    assert expected[3] == expected[0]
 
 
 def blind(case, limit_nm=None):
-    """Effects that are told as not observable."""
+    """Effects that are reported as not observable."""
     mechanism = believed(case.stand)
     if limit_nm is not None:
         drive = mechanism.drives[case.joint]

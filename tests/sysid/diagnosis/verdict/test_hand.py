@@ -5,7 +5,7 @@ import pytest
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.hand.hand_file import load_hand_file, save_hand_file
-from sysid.diagnosis.replay.residuals import joint_effects
+from sysid.diagnosis.replay.effects import joint_effects
 from sysid.diagnosis.verdict.hand import extended_hand
 from sysid.mechanism import hand_mechanism
 from sysid.result import Cause, Diagnosis, Estimate

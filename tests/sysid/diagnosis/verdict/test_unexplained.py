@@ -1,4 +1,4 @@
-"""Neighbours that pull, repeats under jitter, and what named causes leave."""
+"""Neighbours that pull, repeats under jitter, and what remains unexplained."""
 
 from dataclasses import replace
 
@@ -13,12 +13,12 @@ from benchmarks.diagnosis.hidden.stands import make_stand
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.measured.segments import grid_step_s
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search import exchange as diagnose_exchange
+from sysid.diagnosis.search import search as search_module
 from sysid.diagnosis.search.candidate import fit_models
-from sysid.diagnosis.search.coupling import beside, coupled
+from sysid.diagnosis.search.coupling import coupled, with_neighbour
 from sysid.diagnosis.search.search import Search, settled
 from sysid.diagnosis.search.starts import starts_of
-from sysid.diagnosis.verdict.unexplained import _jumps, left_over
+from sysid.diagnosis.verdict.unexplained import _jumps, unexplained_signs
 from sysid.logs.log import make_log
 
 
@@ -49,7 +49,7 @@ def test_a_joint_is_pulled_from_below_or_above(other):
     found = coupled(problem, base).data
     assert found.other == names[other]
     assert np.asarray(found.track.other_q)[:, 0] == pytest.approx(
-        np.asarray(beside(track, names[other]).track.other_q)[:, 0]
+        np.asarray(with_neighbour(track, names[other]).track.other_q)[:, 0]
     )
 
 
@@ -62,43 +62,43 @@ def test_jitter_does_not_widen_the_grid():
     assert grid_step_s([make_log(("a",), t_s, columns)], ["a"]) == 0.005
 
 
-def test_nothing_is_left_of_a_joint_without_effects(searched):
-    assert left_over(searched) == []
+def test_nothing_is_unexplained_of_a_joint_without_effects(searched):
+    assert unexplained_signs(searched) == []
 
 
-def test_an_error_common_to_the_repeats_is_left(searched):
+def test_an_error_common_to_the_repeats_is_unexplained(searched):
     wrong = replace(searched.best, errors=np.array([1.0, 4.6]))
     before = replace(searched.best, errors=np.array([1.0, 16.0]))
-    left = left_over(replace(searched, base=before, best=wrong))
-    assert len(left) == 1
-    assert "mechanics residual" in left[0]
+    signs = unexplained_signs(replace(searched, base=before, best=wrong))
+    assert len(signs) == 1
+    assert "mechanics residual" in signs[0]
     right = replace(searched.best, errors=np.array([1.0, 1.6]))
-    assert left_over(replace(searched, base=before, best=right)) == []
+    assert unexplained_signs(replace(searched, base=before, best=right)) == []
 
 
 def test_sizes_at_the_end_of_their_range_explain_nothing(searched):
     problem = searched.problem
     (i,) = problem.space.of("encoder_scale")
     model = fit_models(problem, [("encoder_scale",)], [searched.base.fit.theta])[0]
-    assert left_over(replace(searched, best=model)) == []
+    assert unexplained_signs(replace(searched, best=model)) == []
     theta = model.fit.theta.copy()
     theta[i] = problem.space.slots[i].high
     edge = replace(model, fit=replace(model.fit, theta=theta, bounded=(i,)))
     assert (
         "encoder_scale.scale met its bound"
-        in left_over(replace(searched, best=edge))[0]
+        in unexplained_signs(replace(searched, best=edge))[0]
     )
 
 
-def test_a_cause_that_bends_a_figure_is_not_all(searched):
+def test_a_cause_that_moves_a_parameter_off_its_prior_is_not_all(searched):
     problem = searched.problem
     (i,) = problem.space.of("stiffness")
     model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
     theta = model.fit.theta.copy()
-    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
-    bent = replace(model, fit=replace(model.fit, theta=theta))
-    left = left_over(replace(searched, best=bent))
-    assert any("stiffness.scale lies 6" in text for text in left)
+    theta[i] = problem.space.slots[i].nominal + 6.0 * problem.space.slots[i].prior_sd
+    off = replace(model, fit=replace(model.fit, theta=theta))
+    signs = unexplained_signs(replace(searched, best=off))
+    assert any("stiffness.scale lies 6" in text for text in signs)
 
 
 def test_jumps_that_do_not_repeat_are_not_noise(searched):
@@ -110,19 +110,19 @@ def test_jumps_that_do_not_repeat_are_not_noise(searched):
     track = problem.data.track
     effort = (np.asarray(track.effort) + jumps).astype(np.float32)
     data = replace(problem.data, track=track.replace(effort=effort))
-    shaken = replace(problem, data=data)
-    left = left_over(replace(searched, problem=shaken))
-    assert any("controller residual has jumps" in text for text in left)
+    jumpy = replace(problem, data=data)
+    signs = unexplained_signs(replace(searched, problem=jumpy))
+    assert any("controller residual has jumps" in text for text in signs)
     model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
-    left = left_over(replace(searched, problem=shaken, best=model))
-    assert any("controller residual has jumps" in text for text in left)
+    signs = unexplained_signs(replace(searched, problem=jumpy, best=model))
+    assert any("controller residual has jumps" in text for text in signs)
 
 
-def test_a_figure_that_has_gone_far_goes_on_from_there(searched):
+def test_a_parameter_that_is_far_off_its_prior_goes_on_from_there(searched):
     problem, base = searched.problem, searched.base
     (i,) = problem.space.of("damping")
     theta = base.fit.theta.copy()
-    theta[i] = problem.space.slots[i].base + 6.0 * problem.space.slots[i].tight
+    theta[i] = problem.space.slots[i].nominal + 6.0 * problem.space.slots[i].prior_sd
     gone = replace(base, fit=replace(base.fit, theta=theta))
     far = starts_of(problem, gone, ["damping"])["damping"]
     assert any(start is theta for start in far)
@@ -131,7 +131,7 @@ def test_a_figure_that_has_gone_far_goes_on_from_there(searched):
 
 
 def test_steps_of_an_encoder_are_no_jumps(searched):
-    """Beside a cause that leaves next to nothing, a least step lies far out."""
+    """Where next to nothing remains unexplained, a least step is an outlier."""
     problem = searched.problem
     quiet = np.zeros((2, *problem.valid.shape[1:]))
     at = np.argwhere(problem.valid[0])[100]
@@ -158,14 +158,14 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
     offered = {first.effects: {"payload_com": [right], "deadband": []}}
     monkeypatch.setattr(
-        diagnose_exchange,
+        search_module,
         "swapped",
         lambda problem, best, base: (offered.get(best.effects, {}), without),
     )
-    monkeypatch.setattr(diagnose_exchange, "pruned", lambda problem, model, base: model)
-    assert diagnose_exchange.exchanged(problem, first, base)[0] is right
+    monkeypatch.setattr(search_module, "pruned", lambda problem, model, base: model)
+    assert search_module.exchanged(problem, first, base)[0] is right
     close = scored(right.effects, 302.0)
     offered[first.effects]["payload_com"] = [close]
-    assert diagnose_exchange.exchanged(problem, first, base)[0] is first
+    assert search_module.exchanged(problem, first, base)[0] is first
     without["deadband"] = scored(("payload_com",), 298.0)
-    assert diagnose_exchange.exchanged(problem, first, base)[0] is without["deadband"]
+    assert search_module.exchanged(problem, first, base)[0] is without["deadband"]

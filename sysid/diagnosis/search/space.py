@@ -1,0 +1,223 @@
+"""The coordinates of one joint: nominal values, priors, ranges and starts.
+
+Every parameter of every effect that a joint can have is one coordinate, and so are the
+nuisance parameters. Nominal values and prior standard deviations come from the drive.
+"""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from envs.actuator.catalogue import CATALOGUE
+from envs.actuator.effect import Parameter
+from sysid.diagnosis.replay.effects import joint_effects
+from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.search.parameters import NUISANCE, Kind, Slot, Space
+from sysid.mechanism import JointDrive, Nominal
+
+SIGMA = 3.0**-0.5
+"""Standard deviation of a uniform density within ±1 tolerance [tolerances]."""
+
+SKEW_S = 5e-4
+"""Tolerance of the age of the angle against the effort [s]."""
+
+HOLD_S = 5e-4
+"""Tolerance of the mean age of an acting torque: a servo of 1 kHz keeps one for a
+millisecond [s]."""
+
+DELAY_S = 1e-3
+"""Least tolerance of a known delay [s]."""
+
+MASS = 0.05
+"""Relative tolerance of masses and inertias."""
+
+ZERO_RAD = 1e-3
+"""Tolerance of an encoder's zero where none is given [rad]."""
+
+ROTOR = 1.0
+"""Tolerance of the logarithm of the motor's share of a joint's inertia."""
+
+_GRIDS = {
+    "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
+    # Half the width of a resonance apart: ω ∝ 1 / √C.
+    "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
+}
+_STEP_RANGE = (0.015, 1.0)
+_RECIPROCAL = {
+    "N·m": (1.0, 1.2, 1.6),
+    "rad/s": (0.6, 0.9, 1.2, 1.8),
+    # A little too tight a limit is far worse than none: its optimum is narrow.
+    "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
+}
+
+
+def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> Space:
+    """Makes the coordinates of one joint.
+
+    Args:
+        track: the records, for scales.
+        drive: nominal values and tolerances.
+        known: which surroundings are known, by field name.
+    """
+    slots, sizes = _nuisances(track, drive), _sizes(track)
+    for effect in joint_effects():
+        kind = CATALOGUE[effect]
+        if all(known.get(name, False) for name in kind.needs):
+            nominal = _nominal(drive, effect, track)
+            for name, parameter in kind.parameters.items():
+                slot = _slot(effect, name, parameter, sizes.get(parameter.unit))
+                slot = slot if track.slide else _bounded(slot, parameter)
+                value = nominal.get(name)
+                slots.append(slot if value is None else _with_prior(slot, value))
+    return Space(tuple(slots))
+
+
+def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
+    """Makes the coordinates of the parameters that belong to no effect."""
+    effort = math.inf if drive.effort_scale.free else drive.effort_scale.tolerance
+    inertia = float(np.mean(np.asarray(track.track.inertia)))
+    rotor = 0.5 * track.armature if track.armature > 0.0 else 0.1 * inertia
+    slots = [
+        _nuisance("effort_gain", "1", "log", 1.0, effort),
+        _nuisance("mass", "1", "log", 1.0, MASS),
+        _nuisance("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
+        _nuisance("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
+        _nuisance("rotor", "kg·m²", "log", rotor, ROTOR),
+    ]
+    if np.any(np.asarray(track.track.ext)):
+        free = _nuisance("push_gain", "1", "linear", 1.0, math.inf)
+        slots.append(replace(free, nominal=1.0))
+    return slots
+
+
+def _nuisance(name: str, unit: str, kind: Kind, scale: float, tolerance: float) -> Slot:
+    sigma = SIGMA * tolerance
+    return Slot(NUISANCE, name, unit, kind, scale, 0.0, -10.0, 10.0, sigma, (), False)
+
+
+def _nominal(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Nominal]:
+    """Returns the nominal values that the simulation has of an effect."""
+    if effect == "stiffness":
+        return {"scale": replace(drive.kp, value=1.0)}
+    if effect == "damping":
+        return {"scale": replace(drive.kd, value=1.0)}
+    found = drive.effects.get(effect, {})
+    if effect == "armature" and not found:
+        # Masses scale all of it; drive and links may be wrong in opposite ways.
+        known = math.sqrt(2.0) * track.armature
+        inertia = known or float(np.mean(np.asarray(track.track.inertia)))
+        return {"inertia_kgm2": Nominal(0.0, MASS * inertia)}
+    if effect == "payload_mass" and not found:
+        return {"mass_kg": Nominal(0.0, MASS * float(np.mean(track.track.payload_kg)))}
+    if effect == "encoder_offset" and not found and not track.slide:
+        return {"offset_rad": Nominal(0.0, ZERO_RAD)}
+    return found
+
+
+def _sizes(track: JointTrack) -> dict[str, float]:
+    """Returns a size that matters for every unit."""
+    torque, speed, angle = track.torque_scale, track.speed_scale, track.angle_scale
+    inertia = max(float(np.mean(np.asarray(track.track.inertia))), 1e-12)
+    return {
+        "N·m": torque,
+        "rad": 0.1 * angle,
+        "rad/s": speed,
+        "N·m·s/rad": torque / speed,
+        "kg·m²": inertia,
+        "N·m/s": torque / 0.03,
+        "1/(N·m)": 1.0 / torque,
+        "1/(N·m)²": 1.0 / torque**2,
+        "rad/(N·m)": 0.05 * angle / torque,
+        "N·m/rad": torque / angle,
+        "s": 0.02,
+    }
+
+
+def _slot(effect: str, name: str, parameter: Parameter, size: float | None) -> Slot:
+    """Makes the coordinate of one parameter, fixed at the effect's identity.
+
+    Args:
+        effect: name of the effect.
+        name: of the parameter.
+        parameter: with prior and identity.
+        size: that matters in these records; None for units without one.
+    """
+    identity = parameter.identity
+    if identity is None:
+        slot = _shape(effect, name, parameter, size)
+    elif math.isinf(identity):
+        scale = size if size is not None else parameter.prior.center
+        starts = _RECIPROCAL.get(parameter.unit, (0.1, 0.3, 1.0, 2.0))
+        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 50.0,
+                    0.0, starts, True)  # fmt: skip
+    elif identity == 1.0:
+        slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,
+                    (-0.3, -0.05, 0.05, 0.3), True)  # fmt: skip
+        slot = replace(slot, released_sd=3.0 * math.log(parameter.prior.spread))
+    else:
+        slot = _linear(effect, name, parameter, size)
+    if effect == "command_quantization":
+        slot = replace(slot, many_optima=True, starts=_STEP_RANGE)
+    return slot
+
+
+def _shape(effect: str, name: str, parameter: Parameter, size: float | None) -> Slot:
+    """A parameter that only shapes its effect: any positive value."""
+    prior = parameter.prior
+    scale = prior.center
+    if size is not None and parameter.unit != "s":
+        scale = 0.1 * size
+    spread = math.log(prior.spread)
+    reach, some = 3.0 * spread + 2.0, 1.2 * spread
+    return Slot(effect, name, parameter.unit, "log", scale, 0.0, -reach, reach, 0.0,
+                (-some, 0.0, some), True)  # fmt: skip
+
+
+def _linear(effect: str, name: str, parameter: Parameter, size: float | None) -> Slot:
+    """A size of its effect, which vanishes at zero."""
+    prior, scale = parameter.prior, size
+    if scale is None:
+        scale = prior.spread if prior.kind == "normal" else prior.center
+    signed = parameter.low < 0.0
+    grid = _GRIDS.get(parameter.unit, (0.1,)) if size is not None else (0.5,)
+    starts = (0.1, -0.1) if signed else grid
+    low = -30.0 if signed else 0.0
+    return Slot(effect, name, parameter.unit, "linear", scale, 0.0, low, 30.0, 0.0,
+                starts, True)  # fmt: skip
+
+
+def _bounded(slot: Slot, parameter: Parameter) -> Slot:
+    """Keeps a coordinate within the range of its parameter."""
+    if slot.kind == "reciprocal":
+        return replace(slot, high=min(slot.high, slot.coordinate(parameter.low)))
+    ends = [slot.coordinate(x) if x != 0.0 or slot.kind == "linear" else slot.low
+            for x in (parameter.low, parameter.high)]  # fmt: skip
+    return replace(slot, low=max(slot.low, ends[0]), high=min(slot.high, ends[1]))
+
+
+def _with_prior(slot: Slot, known: Nominal) -> Slot:
+    """Places a coordinate at its nominal value, with the prior of its tolerance."""
+    absent = known.value == 0.0 and slot.kind == "linear"
+    nominal = slot.coordinate(known.value)
+    if slot.kind == "log":
+        tolerance = known.tolerance
+    elif absent:
+        tolerance = known.tolerance / slot.scale
+    else:
+        tolerance = known.tolerance * abs(nominal)
+    if slot.unit == "s":
+        tolerance = max(tolerance, DELAY_S / slot.scale)
+    starts = slot.starts
+    if slot.kind != "log" and not absent:
+        near = (0.5 * nominal, 0.8 * nominal, 1.25 * nominal, 2.0 * nominal)
+        starts = near + tuple(u for u in starts if u > nominal)
+    low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
+    return replace(
+        slot,
+        nominal=nominal,
+        low=low,
+        prior_sd=math.inf if known.free else SIGMA * tolerance,
+        starts=starts,
+        vanishes=absent or slot.effect in ("stiffness", "damping"),
+    )

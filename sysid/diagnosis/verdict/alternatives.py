@@ -1,0 +1,52 @@
+"""Effects that explain the records as well as a cause: the indistinguishable set."""
+
+import numpy as np
+
+from envs.actuator.catalogue import CATALOGUE
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.search.selection import THRESHOLD
+from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE
+from sysid.diagnosis.verdict.causes import evidence
+from sysid.result import Alternative
+
+DISTINCT = 3.0
+"""Difference of log-likelihood below which two effects are indistinguishable."""
+
+
+def alternatives_of(found: Search) -> tuple[Alternative, ...]:
+    """Returns the alternatives of the strongest cause, and those like another one."""
+    first, *others = sorted(found.best.effects, key=lambda e: -evidence(found, e))
+    alike = [
+        alternative
+        for cause in others
+        for alternative in _alternatives(found, cause)
+        if not alternative.distinguishable
+    ]
+    return (*_alternatives(found, first), *alike)
+
+
+def _alternatives(found: Search, cause: str) -> list[Alternative]:
+    """Returns the effects that could stand in the place of a cause, nearest first.
+
+    One that contains the cause at an end of its shape, as dry friction with a
+    presliding range of zero, is no alternative to it.
+    """
+    gain = evidence(found, cause)
+    result = []
+    for model in found.alternatives.get(cause, []):
+        effect = next(e for e in model.effects if e not in found.best.effects)
+        gap = gain - found.gain(cause, model)
+        distinct = gap > max(DISTINCT, NESTED_SHARE * gain)
+        distinct = distinct or effect in NESTED.get(cause, ())
+        # Chance alone gives some effects as much as a nominal value's small step.
+        chance = gain - gap < THRESHOLD and not _confusable(effect, cause)
+        if np.isfinite(gap) and gap < 0.9 * gain:
+            shown = round(gap, 3)
+            result.append(Alternative(effect, shown, bool(distinct or chance), cause))
+    return sorted(result, key=lambda a: a.score_gap)[:8]
+
+
+def _confusable(one: str, other: str) -> bool:
+    """Whether two effects leave like traces."""
+    pair = CATALOGUE[one].confusable_with, CATALOGUE[other].confusable_with
+    return other in pair[0] or one in pair[1]
