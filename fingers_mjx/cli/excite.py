@@ -40,11 +40,8 @@ def add(actions) -> None:
         ("--speed", 0.0, 4.0, "largest speed [rad/s]"),
         ("--torque-share", 0.0, 0.9, "largest share of the torque (or current) limit"),
     ):
-        what = f"{what} (default {default:g})"
-        parser.add_argument(name, type=options.number(low), default=default, help=what)
-    parser.add_argument(
-        "--repeats", type=options.whole(1, 100), default=3, help="default 3"
-    )
+        options.value(parser, name, options.number(low), default, what)
+    options.value(parser, "--repeats", options.whole(1, 100), 3, "of every wave")
     options.seed(parser)
     parser.add_argument(
         "--no-effects",

@@ -74,12 +74,8 @@ def _add_stance(actions) -> None:
         "Searches the stance, settles it for 4 s and prints it as JSON.",
     )
     options.seed(parser)
-    parser.add_argument(
-        "--starts",
-        type=options.whole(1),
-        default=STANCE_STARTS,
-        help=f"random starts of the search (default {STANCE_STARTS})",
-    )
+    what = "random starts of the search"
+    options.value(parser, "--starts", options.whole(1), STANCE_STARTS, what)
     options.path(parser, "--out", help="instead of stdout")
     options.path(parser, "--hand", help="default: the paper's hand")
 

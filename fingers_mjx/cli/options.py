@@ -71,6 +71,12 @@ def path(parser, *names: str, metavar: str = "FILE", **how) -> None:
     parser.add_argument(*names, type=Path, metavar=metavar, **how)
 
 
+def value(parser, name: str, kind: Callable, default: float, what: str) -> None:
+    """Adds an option whose value is a number; its help ends with the default."""
+    what = f"{what} (default {default:g})"
+    parser.add_argument(name, type=kind, default=default, help=what)
+
+
 def settings(parser, what: str) -> None:
     """Adds `--set`."""
     parser.add_argument(

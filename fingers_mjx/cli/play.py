@@ -42,9 +42,7 @@ def add(commands) -> None:
     )
     _add_keys(parser)
     options.path(parser, "--video", help=".mp4, .webp or .gif to write")
-    parser.add_argument(
-        "--seconds", type=options.number(0.1), default=20.0, help="length (default 20)"
-    )
+    options.value(parser, "--seconds", options.number(0.1), 20.0, "length")
     options.episodes(parser, 1)
     options.seed(parser)
     what = "m/s, m/s, rad/s in V; given several times, they share the time equally"
@@ -67,18 +65,8 @@ def add(commands) -> None:
         default="auto",
         help="what runs the policy",
     )
-    parser.add_argument(
-        "--fps",
-        type=options.number(1.0),
-        default=25.0,
-        help="frames per second (default 25)",
-    )
-    parser.add_argument(
-        "--width",
-        type=options.whole(64, 4096),
-        default=640,
-        help="of the video (default 640)",
-    )
+    options.value(parser, "--fps", options.number(1.0), 25.0, "frames per second")
+    options.value(parser, "--width", options.whole(64, 4096), 640, "of the video")
     options.path(parser, "--json", help="summary to write")
 
 
@@ -93,12 +81,8 @@ def _add_keys(parser) -> None:
         choices=tuple(LEVELS),
         help="keyboard: a Sokoban level, its shortest solution pressed key by key",
     )
-    parser.add_argument(
-        "--retries",
-        type=options.whole(0, 10),
-        default=0,
-        help="keyboard: ask again after a time-out (default 0)",
-    )
+    what = "keyboard: ask again after a time-out"
+    options.value(parser, "--retries", options.whole(0, 10), 0, what)
 
 
 def run(args: argparse.Namespace) -> int:

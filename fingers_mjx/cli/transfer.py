@@ -17,7 +17,6 @@ if TYPE_CHECKING:
 
 NAMES: tuple[str, str] = ("default", "extended")
 
-
 _NOTE = (
     "gain of drift_deg_s and sideways_mps: change of their size; intervals are over "
     "worlds, for this pair of trainings"
@@ -52,12 +51,7 @@ def add(actions) -> None:
     options.path(parser, "--warm-start", metavar="RUN|BUNDLE", help=what)
     options.settings(parser, "a setting of both trainings, as in fingers train")
     options.backend(parser)
-    parser.add_argument(
-        "--episodes",
-        type=options.whole(1),
-        default=64,
-        help="of each kind (default 64)",
-    )
+    options.value(parser, "--episodes", options.whole(1), 64, "of each kind")
     parser.add_argument(
         "--steps", type=options.whole(1), help="control steps of an episode"
     )
