@@ -2,6 +2,7 @@
 
 import doctest
 import re
+import runpy
 import shlex
 from pathlib import Path
 
@@ -37,6 +38,24 @@ def test_examples_of_the_readme_give_what_they_say():
     result = doctest.testfile(str(ROOT / "README.md"), module_relative=False)
     assert result.attempted >= 4
     assert result.failed == 0
+
+
+CONTRIBUTING = re.findall(
+    r"^## (Add .*?)\n.*?```python\n(.*?)```",
+    (ROOT / "CONTRIBUTING.md").read_text("utf-8"),
+    re.MULTILINE | re.DOTALL,
+)
+
+
+@pytest.mark.parametrize(("what", "program"), CONTRIBUTING, ids=lambda x: x[:20])
+def test_examples_of_contributing_run(tmp_path, what, program):
+    (tmp_path / "example.py").write_text(program, "utf-8")
+    assert runpy.run_path(str(tmp_path / "example.py")), what
+
+
+def test_there_is_an_example_of_everything_that_can_be_added():
+    added = [what.split(" of ")[0].split()[-1] for what, _ in CONTRIBUTING]
+    assert added == ["reward", "task", "effect", "driver"]
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=name)
