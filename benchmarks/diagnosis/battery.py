@@ -134,7 +134,7 @@ def run_task(task: Task) -> Row:
         verdict=said.verdict,
         causes=tuple(c.effect for c in said.causes),
         where=tuple(c.where for c in said.causes),
-        rivals=tuple(a.effect for a in same if a.cause == said.causes[0].effect),
+        alternatives=tuple(a.effect for a in same if a.cause == said.causes[0].effect),
         others=tuple(a.effect for a in same if a.cause != said.causes[0].effect),
         not_observable=said.not_observable,
         errors=errors,
@@ -214,7 +214,7 @@ def _run(tasks: list[Task], workers: int, out: Path, seed: int) -> list[Row]:
             print(
                 f"{jobs[job].number:4d} {row.kind:9s} {hidden} ({row.magnitude} "
                 f"{row.ratio:.2f}) -> {row.verdict} {'+'.join(row.causes)} "
-                f"| {', '.join(row.rivals)} {row.note} {row.runtime_s:.0f} s",
+                f"| {', '.join(row.alternatives)} {row.note} {row.runtime_s:.0f} s",
                 flush=True,
             )
     wanted = {task.seed for task in tasks}

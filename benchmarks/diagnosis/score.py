@@ -34,7 +34,7 @@ class Row:
         verdict: of the diagnosis, `error` if it raised.
         causes: names in order of gain.
         where: where each cause acts.
-        rivals: alternatives that are not distinguishable from the first cause.
+        alternatives: effects that are not distinguishable from the first cause.
         others: those that are not distinguishable from one of the further causes.
         not_observable: effects that the diagnosis says it could not see.
         errors: relative size errors by parameter.
@@ -55,7 +55,7 @@ class Row:
     verdict: str
     causes: tuple[str, ...] = ()
     where: tuple[str, ...] = ()
-    rivals: tuple[str, ...] = ()
+    alternatives: tuple[str, ...] = ()
     others: tuple[str, ...] = ()
     not_observable: tuple[str, ...] = ()
     errors: dict[str, float] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class Row:
     @property
     def named(self) -> set[str]:
         """The first cause and what cannot be distinguished from it."""
-        return {*self.causes[:1], *self.rivals} if self.causes else set()
+        return {*self.causes[:1], *self.alternatives} if self.causes else set()
 
     @property
     def has_both(self) -> bool:
@@ -75,7 +75,7 @@ class Row:
 
         One cause with its alternatives stands for one effect only.
         """
-        said = {*self.causes, *self.rivals, *self.others}
+        said = {*self.causes, *self.alternatives, *self.others}
         return set(self.effects) <= said and len(self.causes) >= len(self.effects)
 
     @property
@@ -104,7 +104,14 @@ class Row:
     def from_json(line: str) -> "Row":
         """Reads `to_json`."""
         data: dict[str, Any] = json.loads(line)
-        lists = ("effects", "causes", "where", "rivals", "others", "not_observable")
+        lists = (
+            "effects",
+            "causes",
+            "where",
+            "alternatives",
+            "others",
+            "not_observable",
+        )
         data |= {name: tuple(data[name]) for name in lists}
         return Row(**data)
 

@@ -15,7 +15,7 @@ def row(group="single", effects=("backlash",), ratio=2.0, **said):
 def perfect():
     return [
         row(errors={"backlash.gap_rad": 0.01}, covered={"x": True}, explained=0.97),
-        row(effects=("deadband",), rivals=("backlash",), ratio=1.3),
+        row(effects=("deadband",), alternatives=("backlash",), ratio=1.3),
         row("none", (), verdict="none"),
         row("double", ("backlash", "deadband")),
         row("outside", ("gear_ripple",), verdict="unexplained", causes=()),
@@ -52,9 +52,11 @@ def test_figures_of_a_right_and_of_a_wrong_diagnosis():
 def test_what_moves_the_same_counts_as_right_if_it_was_named():
     alone = row(effects=("mount_tilt",), causes=("encoder_offset",))
     named = row(
-        effects=("mount_tilt",), causes=("encoder_offset",), rivals=("mount_tilt",)
+        effects=("mount_tilt",),
+        causes=("encoder_offset",),
+        alternatives=("mount_tilt",),
     )
-    other = row(effects=("deadband",), causes=("backlash",), rivals=("deadband",))
+    other = row(effects=("deadband",), causes=("backlash",), alternatives=("deadband",))
     assert [r.right for r in (alone, named, other)] == [False, True, False]
     same = "first or the same, medium"
     assert figures([named])[same]["rate"] == 1.0
