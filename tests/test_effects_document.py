@@ -1,4 +1,4 @@
-"""`docs/reference/effects.md` tells of the effects that there are."""
+"""`docs/reference/effects.md` describes the effects that there are."""
 
 import re
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""What is written tells nothing of the machine or the person, and is readable (X8)."""
+"""What is written names nothing of the machine or the person, and is readable (X8)."""
 
 import getpass
 import platform

@@ -50,7 +50,7 @@ def test_its_interface_is_that_of_the_task_today(folder):
 
 
 @each
-def test_the_text_tells_what_was_measured(folder):
+def test_the_text_states_what_was_measured(folder):
     measured = json.loads((folder / "evaluation.json").read_text("utf-8"))
     assert measured["task"] == folder.name
     text = STATED[folder.name].read_text("utf-8")

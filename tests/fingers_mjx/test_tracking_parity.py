@@ -72,7 +72,7 @@ def test_differences_would_be_seen(name):
     assert both(WRONG[name]).max() > 1e-3
 
 
-def test_steady_motion_is_told_as_it_is():
+def test_steady_motion_is_reported_as_it_is():
     """In V: the hand looks along world y, so a cube moving along y moves ahead."""
     tracker = deployed.ObjectTracker([0, 0.5, 0.02], [1, 0, 0, 0])
     for step in range(200):

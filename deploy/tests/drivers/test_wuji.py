@@ -122,7 +122,7 @@ def test_power_is_confirmed_by_a_newer_read_back(library, driver):
     assert not library.DEVICE.enabled.any()
 
 
-def test_values_freeze_silently_but_the_slow_path_tells(library, driver):
+def test_values_freeze_silently_but_the_slow_path_shows_it(library, driver):
     assert _wait(lambda: driver.health() is not None)
     first = driver.read().pos_rad
     library.DEVICE.connected = False

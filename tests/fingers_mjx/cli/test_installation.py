@@ -1,4 +1,4 @@
-"""Versions that cannot work and packages in our place are told before anything runs.
+"""Versions that cannot work and packages in our place are reported before anything runs.
 
 T11 (the range of jaxlib that hangs on the CPU) and X6 (floors and exclusions).
 """
@@ -75,7 +75,7 @@ def test_missing_package_is_named():
         ("rewards", "namespace"),
     ],
 )
-def test_foreign_package_in_our_place_is_told(tmp_path, name, kind):
+def test_foreign_package_in_our_place_is_reported(tmp_path, name, kind):
     """One sentence and status 6 from a directory that holds something of that name."""
     place = tmp_path / name if kind != "module" else tmp_path / f"{name}.py"
     place.write_text("") if kind == "module" else place.mkdir()

@@ -161,8 +161,8 @@ def test_play_writes_video_and_summary(bundle_dir, tmp_path, capsys):
 def test_play_draws_the_worlds_of_the_evaluation(tmp_path):
     """Same seed, same worlds, same steps: the sim-to-sim check compares like with like.
 
-    Over so few steps that the last bits, which contacts magnify, do not tell yet; a
-    step more or less, or a first step of another kind, tells.
+    Over so few steps that the last bits, which contacts magnify, do not count yet; a
+    step more or less, or a first step of another kind, shows.
     """
     paths = [tmp_path / f"{name}.json" for name in ("eval", "play")]
     common = [str(POLICY_DIR), "--episodes", "3", "--seed", "4", "--json"]

@@ -154,8 +154,8 @@ def test_a_level_is_solved_by_simulated_key_strokes(player, tmp_path):
     assert result.board(START).solved
     columns = session.table.columns
     assert columns["requests"] == 9 and columns["correct_fraction"] == 1.0
-    told = [outcome.latency_s for outcome in result.outcomes]
-    assert columns["latency_median_s"] == pytest.approx(np.median(told), abs=1e-3)
+    reported = [outcome.latency_s for outcome in result.outcomes]
+    assert columns["latency_median_s"] == pytest.approx(np.median(reported), abs=1e-3)
     assert boards_of(session.first.trace, START)[-1].solved
 
     film = Film(tmp_path / "level.webp", 1.0, 128, lambda *_: None)

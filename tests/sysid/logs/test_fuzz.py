@@ -30,12 +30,12 @@ OPENED: list[str] = []
 WATCHING: list[bool] = []
 
 
-def _heard(event, arguments):
+def _audited(event, arguments):
     if WATCHING and event in ("open", "sqlite3.connect"):
         OPENED.append(str(arguments[0]))
 
 
-sys.addaudithook(_heard)
+sys.addaudithook(_audited)
 
 
 @contextmanager

@@ -9,7 +9,7 @@ from sysid.logs.log import make_log
 from sysid.logs.read import write_log
 
 
-def test_info_tells_what_is_irregular():
+def test_info_reports_what_is_irregular():
     lines = info_lines(small_log(note="second record"))
     text = "\n".join(lines)
     assert "joints    knee, hip" in text
@@ -23,7 +23,7 @@ def test_info_tells_what_is_irregular():
     assert angle.endswith("1 gaps")
 
 
-def test_a_clock_that_stands_is_told():
+def test_a_clock_that_stands_is_reported():
     same, angle = np.ones(2), np.array([0.0, 1.0])
     log = make_log(("a",), same, {"cmd.a": angle, "pos.a": angle})
     with pytest.raises(InputError, match="times that increase"):

@@ -104,8 +104,8 @@ def test_a_verdict_asks_for_more_than_chance():
     strength = cause.parameters["strength"]
     assert strength.value == pytest.approx(np.exp(-0.3))
     assert strength.low < strength.value < strength.high < 1.0
-    rival = judged(6, clear[0].gains + rng.normal(0.0, 5.0, 10))
-    found = verdict_of(axes(), [clear[0], rival], plain, count)
+    other = judged(6, clear[0].gains + rng.normal(0.0, 5.0, 10))
+    found = verdict_of(axes(), [clear[0], other], plain, count)
     assert found["verdict"] == "ambiguous"
     assert not found["alternatives"][0].distinguishable
 
