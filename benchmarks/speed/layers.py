@@ -4,8 +4,8 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from bare import Layer, bare_cpu, bare_warp
 
+from benchmarks.speed.bare import Layer, bare_cpu, bare_warp
 from envs.batch import BatchEnv
 
 ACTION_STD = 0.3

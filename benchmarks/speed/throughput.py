@@ -27,9 +27,9 @@ os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
 import jax
 import mujoco
-from bare import Layer
-from layers import LAYERS
 
+from benchmarks.speed.bare import Layer
+from benchmarks.speed.layers import LAYERS
 from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 
