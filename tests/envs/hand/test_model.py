@@ -52,9 +52,9 @@ def test_the_check_poses_notice_each_joint(joint):
     """Negative control: a tenth of a degree in any joint moves a tip by more."""
     wrong = []
     for qpos, tips in CHECKS:
-        bent = qpos.copy()
-        bent[joint] += np.deg2rad(0.1)
-        wrong.append(np.abs(tips_in_palm(bent) - tips).max())
+        moved = qpos.copy()
+        moved[joint] += np.deg2rad(0.1)
+        wrong.append(np.abs(tips_in_palm(moved) - tips).max())
     assert max(wrong) > 1e-5
 
 

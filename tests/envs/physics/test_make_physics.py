@@ -35,7 +35,7 @@ def test_feature_that_mjx_lacks_is_named():
         make_physics("jax", model, 4, 1)
 
 
-def test_missing_warp_is_told_and_not_the_default(mj_model, monkeypatch):
+def test_missing_warp_is_reported_and_not_the_default(mj_model, monkeypatch):
     monkeypatch.setattr(quiet_mjx, "WARP_INSTALLED", False)
     monkeypatch.setattr(backends, "WARP_INSTALLED", False)
     with pytest.raises(InputError, match=r"fingers-mjx\[warp\]"):

@@ -1,4 +1,4 @@
-"""Versions that cannot work and packages in our place are reported before anything runs.
+"""Versions that cannot work and packages in our place are reported at once.
 
 T11 (the range of jaxlib that hangs on the CPU) and X6 (floors and exclusions).
 """

@@ -94,10 +94,8 @@ def test_before_the_detector_fires_the_policy_runs_as_by_itself(recovery):
     for _ in range(40):
         joints, rates = rng.normal(0, 0.3, 20), rng.normal(0, 0.3, 3)
         side = np.array([0.0, 1.0, 0.0])
-        reported = (joints, side, rates, np.zeros(3))
-        np.testing.assert_allclose(
-            shim.step(*reported), alone.step(*reported), atol=1e-6
-        )
+        inputs = (joints, side, rates, np.zeros(3))
+        np.testing.assert_allclose(shim.step(*inputs), alone.step(*inputs), atol=1e-6)
     assert not shim.settling
 
 
@@ -131,10 +129,8 @@ def test_an_upright_hand_settles_and_the_next_policy_takes_over(
     # The operator has asked all the time; the command still rises from rest.
     speed = trace.command[76:, 0]
     assert 0 < speed[0] < 0.05 and speed[-1] == pytest.approx(0.1)
-    reported = story(session.first, DT_S, "crawl")
-    assert reported.startswith(
-        "upright after 0.0 s, in the stance after 1.5 s; crawl then"
-    )
+    text = story(session.first, DT_S, "crawl")
+    assert text.startswith("upright after 0.0 s, in the stance after 1.5 s; crawl then")
 
 
 def test_without_a_next_policy_the_stance_is_held(standing, recovery):

@@ -225,7 +225,7 @@ def test_torque_slope_is_constant_whatever_the_step():
         assert np.diff(x.torque)[1:20] / rig.DT == pytest.approx(5.0, rel=1e-3)
 
 
-def test_eccentric_encoder_tells_the_speed_of_its_angle():
+def test_eccentric_encoder_reports_the_speed_of_its_angle():
     params = {"sine_rad": 0.05, "cosine_rad": -0.03}
     _, _, x = rig.run({"encoder_eccentricity": params}, 5.0 * swing())
     found = np.diff(x.encoder) / rig.DT

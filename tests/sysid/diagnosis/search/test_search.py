@@ -32,8 +32,8 @@ def test_amplified_noise_gains_nothing():
 
 
 def test_a_spring_that_drifts_to_less_noise_gains_nothing_by_that():
-    louder, quieter = model(1000.0, noise_cost=80.0), model(900.0, noise_cost=60.0)
-    assert log_likelihood_gain(louder, quieter, 2000) == pytest.approx(50.0)
+    noisier, quieter = model(1000.0, noise_cost=80.0), model(900.0, noise_cost=60.0)
+    assert log_likelihood_gain(noisier, quieter, 2000) == pytest.approx(50.0)
 
 
 def test_what_a_cause_must_gain_is_measured_in_its_own_residual():
