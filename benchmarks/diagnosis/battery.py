@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks.diagnosis.hidden.cases import RATIOS, Case, draw_case
 from benchmarks.diagnosis.hidden.sizes import SCALES
 from benchmarks.diagnosis.hidden.truth import OUTSIDE
-from benchmarks.diagnosis.score import Row, confusion, figures, report
+from benchmarks.diagnosis.score import Row, confusion, report, statistics
 
 CATALOGUE = tuple(name for name in SCALES if name not in OUTSIDE)
 SHARES = {
@@ -185,7 +185,7 @@ def main() -> None:
     rows = _run(tasks, args.workers, args.out, seed)
     summary = {
         "seed": seed,
-        "figures": figures(rows),
+        "statistics": statistics(rows),
         "confusion": confusion(rows),
     }
     text = f"seed {seed}, {len(rows)} records\n{report(rows)}\n"

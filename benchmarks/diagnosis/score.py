@@ -129,7 +129,7 @@ def _rate(hits: Iterable[bool]) -> dict[str, float | int]:
     return {"rate": rate, "n": len(found)}
 
 
-def figures(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
+def statistics(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
     """Returns all scores by name; a rate comes with the number of cases."""
     groups = {g: [r for r in rows if r.group == g] for g in _GROUPS}
     single = groups["single"]
@@ -206,7 +206,7 @@ def report(rows: Sequence[Row]) -> str:
         mark = "outside: " if name in OUTSIDE else ""
         lines.append(f"  {mark}{name:24s} {found}")
     lines.append("")
-    for name, values in figures(rows).items():
+    for name, values in statistics(rows).items():
         text = ", ".join(
             f"{k} {v:.3f}" if isinstance(v, float) else f"{k} {v}"
             for k, v in values.items()

@@ -21,7 +21,7 @@ class Layer:
     Attributes:
         call: does some control steps in every world and waits for them.
         steps: how many.
-        note: what a reader of the figure must know.
+        note: what a reader of the number must know.
     """
 
     call: Callable[[], None]

@@ -7,7 +7,7 @@ Prints control steps per second of all worlds together (four physics steps each)
 the ratio to bare physics, which is native batch stepping: `mujoco.batch.Batch` for cpu,
 MuJoCo Warp replaying a CUDA graph for warp, a scan of `mjx.step` for jax. All layers
 step hands that stand in the stance, with small random actions where a layer takes
-actions. Each figure is the median over calls. On warp each layer has a process of its
+actions. Each number is the median over calls. On warp each layer has a process of its
 own, one after the other; elsewhere they take turns in one process.
 """
 
@@ -155,7 +155,7 @@ def _ratios(
 
 
 def _machine() -> str:
-    """What the figures were taken on; nothing that names the machine."""
+    """What the numbers were taken on; nothing that names the machine."""
     device = jax.devices()[0].device_kind
     return f"{os.cpu_count()} cores ({platform.machine()}), JAX on {device}"
 

@@ -71,7 +71,7 @@ class HandFile:
     tip_friction: Quantity = field(metadata=limits("1", 0.0, 10.0))
     link_friction: Quantity = field(metadata=limits("1", 0.0, 10.0))
     effects: tuple[Effect, ...] = ()
-    figures: NominalHand | None = None
+    description: NominalHand | None = None
 
     def __post_init__(self) -> None:
         if self.schema != SCHEMA:
@@ -86,7 +86,7 @@ class HandFile:
     @property
     def nominal(self) -> NominalHand:
         """Nominal parameters, which the scales multiply: its own, else the vendor's."""
-        return self.figures or vendor_hand()
+        return self.description or vendor_hand()
 
     @property
     def without_effects(self) -> "HandFile":
@@ -97,8 +97,8 @@ class HandFile:
     def sha256(self) -> str:
         """Digest of the contents; layout and comments of the file do not enter."""
         data = to_dict(self)
-        if self.figures is None:  # as files without the field always were
-            del data["figures"]
+        if self.description is None:  # as files without the field always were
+            del data["description"]
         text = json.dumps(data, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 

@@ -215,7 +215,7 @@ def test_heading_and_place_change_nothing_in_v(moving):
     assert np.abs(one.tip_vel_w - other.tip_vel_w).max() > 1e-3
 
 
-def test_names_follow_the_order_of_the_figures():
+def test_names_follow_the_order_of_the_description():
     assert len(OTHER_LINKS) == 10 and len(TIP_SPHERES) == 5
     assert [link.joint for link in vendor_hand().links] == [
         MODEL.actuator(i).name for i in range(20)

@@ -190,7 +190,7 @@ def _hand_file(
         name=f"hand {note}",
         palm_mass=Quantity(own.palm.mass, "kg", "user", note=note),
         palm_com_offset=Vector((0.0, 0.0, 0.0), "m", "user", note=note),
-        figures=own,
+        description=own,
         **payload,
         **scales,
     )

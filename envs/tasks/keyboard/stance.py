@@ -39,9 +39,9 @@ def keyboard_stance(hand: HandFile) -> Stance:
     Raises:
         InputError: the hand has a shape of its own, or does not stand in the stance.
     """
-    if hand.figures:
+    if hand.description:
         valid = "none: the task computes its fingertip with the vendor's dimensions"
-        raise InputError("hand file", "figures", "figures of a hand", valid)
+        raise InputError("hand file", "description", "the description of a hand", valid)
     return stance_of(hand, load_stance("envs.tasks.keyboard"))
 
 

@@ -3,7 +3,7 @@
 import pytest
 
 from benchmarks.diagnosis import battery
-from benchmarks.diagnosis.score import Row, confusion, figures, report, upper_bound
+from benchmarks.diagnosis.score import Row, confusion, report, statistics, upper_bound
 
 
 def row(group="single", effects=("backlash",), ratio=2.0, **said):
@@ -35,7 +35,7 @@ def wrong():
 
 
 def test_figures_of_a_right_and_of_a_wrong_diagnosis():
-    good, bad = figures(perfect()), figures(wrong())
+    good, bad = statistics(perfect()), statistics(wrong())
     rates = ("in named set", "no second cause", "both of two", "outside: unexplained")
     for name in (*rates, "invisible: not observable"):
         assert (good[name]["rate"], bad[name]["rate"]) == (1.0, 0.0), name
@@ -59,8 +59,8 @@ def test_what_moves_the_same_counts_as_right_if_it_was_named():
     other = row(effects=("deadband",), causes=("backlash",), alternatives=("deadband",))
     assert [r.right for r in (alone, named, other)] == [False, True, False]
     same = "first or the same, medium"
-    assert figures([named])[same]["rate"] == 1.0
-    assert figures([named])["first medium"]["rate"] == 0.0
+    assert statistics([named])[same]["rate"] == 1.0
+    assert statistics([named])["first medium"]["rate"] == 0.0
 
 
 def test_upper_bound_is_that_of_the_literature():

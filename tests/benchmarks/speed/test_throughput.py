@@ -1,4 +1,4 @@
-"""The benchmark runs and its ratios are those of its figures."""
+"""The benchmark runs and its ratios are those of its numbers."""
 
 import json
 import subprocess

@@ -132,7 +132,7 @@ def test_the_chain_is_that_of_identification():
     np.testing.assert_array_equal(gap > 0.0, (np.arange(20) // 4) == 1)
 
 
-def test_stance_and_falls_are_those_of_the_figures():
+def test_stance_and_falls_are_those_of_the_description():
     hand = rig.hand_with(rig.entry("payload_mass", mass_kg=0.05))
     assert stance_of(hand) == load_stance()
     default = load_hand_file()

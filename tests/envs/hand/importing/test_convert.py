@@ -202,7 +202,7 @@ def with_link(hand, index, **changes):
     links = list(hand.nominal.links)
     links[index] = dataclasses.replace(links[index], **changes)
     own = dataclasses.replace(hand.nominal, links=tuple(links))
-    return dataclasses.replace(hand, figures=own)
+    return dataclasses.replace(hand, description=own)
 
 
 def test_the_frame_of_the_palm_may_be_given(tmp_path):
@@ -281,35 +281,39 @@ def test_a_flat_link_keeps_moments_that_a_body_can_have(tmp_path):
 
 def test_the_keyboard_task_refuses_it():
     """Its fingertip is computed from the vendor's dimensions, here and on the robot."""
-    own = dataclasses.replace(HAND, figures=vendor_hand())
-    with pytest.raises(InputError, match="hand file: figures"):
+    own = dataclasses.replace(HAND, description=vendor_hand())
+    with pytest.raises(InputError, match="hand file: description"):
         make_env("keyboard", hand=own)
 
 
 FIELDS = [
-    ("quat: [0.68", "quat: [0.98", "figures.links.0.quat: found"),
+    ("quat: [0.68", "quat: [0.98", "description.links.0.quat: found"),
     (
         "body: finger1_link2",
         "body: finger1_linq2",
-        "figures.links: found finger1_linq2",
+        "description.links: found finger1_linq2",
     ),
-    ("mass: 0.0248", "mass: -1.0", r"figures.links.1.mass: found -1.0; valid: .* >="),
-    ("joint: finger5_joint4", "join: x", "figures.links.19.join: found join"),
-    ("bounds_max: [0.0141", "bounds_max: [-0.4", "figures.palm.bounds_max: found"),
-    ("armature: 0.0005", "armature: .nan", "figures.links.0.armature: found"),
-    ("tip: [-0.00105", "tap: [-0.00105", "figures.links.3.tap: found tap"),
+    (
+        "mass: 0.0248",
+        "mass: -1.0",
+        r"description.links.1.mass: found -1.0; valid: .* >=",
+    ),
+    ("joint: finger5_joint4", "join: x", "description.links.19.join: found join"),
+    ("bounds_max: [0.0141", "bounds_max: [-0.4", "description.palm.bounds_max: found"),
+    ("armature: 0.0005", "armature: .nan", "description.links.0.armature: found"),
+    ("tip: [-0.00105", "tap: [-0.00105", "description.links.3.tap: found tap"),
     (
         "diaginertia: [3.37599e-07",
         "diaginertia: [6.0e-07",
         "links.0.diaginertia: found",
     ),
-    ("range_rad: [0.0475", "range_rad: [2.0", "figures.links.0.range_rad: found"),
+    ("range_rad: [0.0475", "range_rad: [2.0", "description.links.0.range_rad: found"),
 ]
 
 
 @pytest.mark.parametrize(("old", "new", "message"), FIELDS)
-def test_malformed_figures_are_named(tmp_path, old, new, message):
-    own = dataclasses.replace(HAND, figures=vendor_hand())
+def test_malformed_descriptions_are_named(tmp_path, old, new, message):
+    own = dataclasses.replace(HAND, description=vendor_hand())
     text = hand_yaml(own)
     assert old in text
     path = tmp_path / "hand.yaml"
@@ -318,8 +322,8 @@ def test_malformed_figures_are_named(tmp_path, old, new, message):
         load_hand_file(path)
 
 
-def test_figures_survive_the_hand_file_and_count_in_its_digest(tmp_path):
-    own = dataclasses.replace(HAND, figures=vendor_hand())
+def test_a_description_survives_the_hand_file_and_counts_in_its_digest(tmp_path):
+    own = dataclasses.replace(HAND, description=vendor_hand())
     path = tmp_path / "hand.yaml"
     path.write_text(hand_yaml(own), encoding="utf-8")
     assert load_hand_file(path) == own
