@@ -1,4 +1,4 @@
-"""The tracker of the shim (NumPy) and of training (JAX) are one."""
+"""The tracker of the robot (NumPy) and of training (JAX) are one."""
 
 import jax
 import jax.numpy as jnp
@@ -9,7 +9,7 @@ from envs.hand.stance import load_stance
 from envs.rotations import unrotate
 from envs.tasks.push import tracking as trained
 from envs.tasks.push.camera import Frame
-from fingers_deploy import tracking as deployed
+from fingers_robot.behaviour import tracking as deployed
 
 Q_OFF = np.array(load_stance().q_off)
 TARGET = np.array([0.3, -0.1, 0.02])
