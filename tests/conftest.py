@@ -1,14 +1,16 @@
 """Runs shape annotations as checks, and watches the interpreter (X1, X3)."""
 
 import sys
+from pathlib import Path
 
 import pytest
-from jaxtyping import install_import_hook
+from jaxtyping import config, install_import_hook
 from support import shapes
 
 # Before any test imports them: every array is checked against its annotation.
 CHECKER = f"{shapes.__name__}.{shapes.check_arrays.__name__}"
-install_import_hook(["rewards", "envs", "sysid"], CHECKER)
+SHAPED = ["rewards", "envs", "sysid"]
+install_import_hook(SHAPED, CHECKER)
 
 NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
 UNSAFE = ("pickle.find_class", "os.system")
@@ -47,6 +49,13 @@ def is_shell(event, args):
 
 WATCH = Watch()
 sys.addaudithook(WATCH.hook)
+
+
+@pytest.fixture(autouse=True)
+def shapes_are_checked(request):
+    """Checks arrays where a package tests itself; elsewhere it would only take time."""
+    rooms = request.path.relative_to(Path(__file__).parent).parts
+    config.update("jaxtyping_disable", rooms[0] not in SHAPED)
 
 
 @pytest.fixture(autouse=True)
