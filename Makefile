@@ -3,7 +3,8 @@
 
 UV := $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := $(UV) run --no-sync
-QUICK := tests/test_layers.py tests/test_documentation.py tests/rewards
+QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
+	tests/test_documentation.py tests/rewards
 
 .DEFAULT_GOAL := help
 .PHONY: help sync format check test test-slow test-gpu demo battery bench build clean
