@@ -63,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
     """Trains both policies, unless they are given, and compares them."""
     from envs.hand.hand_file import load_hand_file
     from fingers_mjx.policy.source import load_source
-    from fingers_mjx.transfer import compared, in_real_hand
+    from fingers_mjx.studies.transfer import compared, in_real_hand
 
     backend = options.backend_of(args)
     options.check_directory("--out", args.out)
@@ -99,8 +99,8 @@ def _trained(args: argparse.Namespace) -> list[Path]:
     """Trains both, with the same settings and the same seed."""
     from envs.hand.hand_file import load_hand_file
     from fingers_mjx.runs.setup import new_setup, overridden
+    from fingers_mjx.studies.transfer import train_on
     from fingers_mjx.training.progress import reporter
-    from fingers_mjx.transfer import train_on
 
     config = options.train_config(args, args.seed)
     setup = overridden(new_setup(config, args.default), args.settings)

@@ -13,7 +13,7 @@ from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli.main import main
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.record import Trace
-from fingers_mjx.transfer import Evaluated, columns, compared, drift
+from fingers_mjx.studies.transfer import Evaluated, columns, compared, drift
 
 STEPS, EPISODES = 20, 3
 FIELDS = dataclasses.fields(cast(Any, Trace))

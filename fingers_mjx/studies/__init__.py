@@ -1,0 +1,1 @@
+"""Studies over seeds: what several trainings of each configuration show together."""
