@@ -1,4 +1,9 @@
-"""Statistics of evaluations: intervals over episodes, paired differences over seeds."""
+"""Statistics of one evaluation: intervals over its episodes.
+
+They say how well the episodes measure the policies at hand. They say nothing about the
+training that made these: another seed makes another policy. Claims about trainings need
+several seeds and `fingers_mjx.studies.statistics`.
+"""
 
 from dataclasses import dataclass
 
@@ -103,20 +108,19 @@ def bootstrap_interval(
 
 
 def paired_difference(
-    ours: Float[np.ndarray, " seeds"],
-    other: Float[np.ndarray, " seeds"],
+    ours: Float[np.ndarray, " worlds"],
+    other: Float[np.ndarray, " worlds"],
     confidence: float = 0.95,
     seed: int = 0,
 ) -> Summary:
-    """Summarizes dᵢ = oursᵢ - otherᵢ over seeds i that both were trained on, as x [1].
+    """Summarizes dᵢ = oursᵢ - otherᵢ of two policies in the same worlds i, as x [1].
 
-    Seeds, not episodes, are resampled: episodes of one policy are not independent
-    evidence about the training method. A seed that either side does not define
-    does not count.
+    Worlds are resampled, so the interval is of these two policies and of no other
+    training. A world that either side does not define does not count.
 
     Args:
-        ours: one number per seed.
-        other: the same seeds in the same order.
+        ours: one number per world.
+        other: the same worlds in the same order.
         confidence: coverage of the interval.
         seed: of the resampling.
 
@@ -127,7 +131,7 @@ def paired_difference(
         Ours; the interval is that of `bootstrap_interval`.
     """
     if len(ours) != len(other):
-        found, valid = f"{len(other)} seeds", f"{len(ours)} seeds as the first"
+        found, valid = f"{len(other)} worlds", f"{len(ours)} worlds as the first"
         raise InputError("paired_difference", "other", found, valid)
     difference = np.asarray(ours, float) - np.asarray(other, float)
     difference = difference[~np.isnan(difference)]

@@ -80,7 +80,7 @@ def test_infinity_is_an_error():
         summarize(np.array([1.0, np.inf]))
 
 
-def test_pairing_removes_what_seeds_have_in_common():
+def test_pairing_removes_what_worlds_have_in_common():
     print("seed", SEED)
     rng = np.random.default_rng(SEED)
     level = rng.normal(0.0, 1.0, 12)
@@ -99,10 +99,10 @@ def test_paired_difference_of_zeros_and_ones_is_not_a_proportion():
     assert found.high <= 1.0
 
 
-def test_paired_difference_leaves_out_undefined_seeds_and_refuses_other_lengths():
+def test_paired_difference_leaves_out_undefined_worlds_and_refuses_other_lengths():
     found = paired_difference(np.array([1.0, np.nan, 3.0]), np.array([0.0, 1.0, 1.0]))
     assert (found.mean, found.n) == (1.5, 2)
-    with pytest.raises(InputError, match=r"2 seeds.*3 seeds"):
+    with pytest.raises(InputError, match=r"2 worlds.*3 worlds"):
         paired_difference(np.zeros(3), np.zeros(2))
 
 

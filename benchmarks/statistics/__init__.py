@@ -1,0 +1,1 @@
+"""How often statistics over seeds are right: synthetic studies with known answers."""

@@ -1,0 +1,1 @@
+"""Statistics over seeds: what few trainings of each configuration can show."""
