@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from fingers_mjx.ppo.config import TrainConfig
     from fingers_mjx.runs.setup import Setup
 
-_FOR_NEW_RUNS = ("hand", "out", "warm_start")
+_FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules")
 
 
 def add(commands) -> None:
@@ -50,6 +50,12 @@ def add(commands) -> None:
         help="start from the networks of this run or checkpoint, or from the policy of "
         "a bundle, which may be of another task",
     )
+    parser.add_argument(
+        "--schedules",
+        choices=("keep", "restart"),
+        help="after --warm-start, whether reward schedules go on from the steps that "
+        "the run has done; default restart",
+    )
 
 
 def run(args: argparse.Namespace) -> int:
@@ -71,7 +77,7 @@ def run(args: argparse.Namespace) -> int:
             env,
             setup,
             path,
-            start=Start(resume, args.warm_start),
+            start=Start(resume, args.warm_start, args.schedules == "keep"),
             identity=identity(env),
             on_progress=show,
         )

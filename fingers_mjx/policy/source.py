@@ -74,6 +74,12 @@ def is_run(path: Path) -> bool:
     return (path / RUN_FILE).is_file()
 
 
+def is_bundle(path: Path) -> bool:
+    """Whether `path` is a bundle; one that was exported into its run is the run."""
+    exported = (path / POLICY_FILE).is_file()
+    return path.suffix == ".onnx" or (exported and not is_run(path))
+
+
 def check_run(path: Path) -> None:
     """Raises InputError if `path` is no run directory."""
     if not is_run(path):

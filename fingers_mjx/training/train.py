@@ -16,6 +16,7 @@ from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
 from fingers_mjx.training.progress import OnProgress, Ticker
+from fingers_mjx.training.schedules import steps_done, with_steps
 from fingers_mjx.training.session import Session, bound
 from fingers_mjx.training.signals import StopSignals
 from fingers_mjx.training.warm_start import completed, started_from
@@ -50,17 +51,22 @@ class Start:
         resume: go on from the newest intact checkpoint of the run directory.
         warm_start: run directory, checkpoint or bundle whose networks the new run
             starts from (`fingers_mjx.training.warm_start`); all else starts afresh.
+        keep_schedules: curricula go on from the control steps that the run of
+            `warm_start` has done (`fingers_mjx.training.schedules`).
 
     Raises:
-        InputError: both are given.
+        InputError: `warm_start` with `resume`, or `keep_schedules` without it.
     """
 
     resume: bool = False
     warm_start: Path | None = None
+    keep_schedules: bool = False
 
     def __post_init__(self) -> None:
         if self.resume and self.warm_start:
             raise InputError("--warm-start", "", self.warm_start, "without --resume")
+        if self.keep_schedules and not self.warm_start:
+            raise InputError("--schedules", "", "keep", "with --warm-start RUN")
 
 
 FRESH = Start()
@@ -97,7 +103,7 @@ def train(
     """
     config = setup.train
     check_config(config)
-    learned = _learned(env, setup, start)
+    steps, learned = _counted(start), _learned(env, setup, start)
     use_compile_cache()
 
     def say(text: str) -> None:
@@ -114,7 +120,9 @@ def train(
             check_bound(path, shared, {f"env.{x}" for x in free_fields(setup.env)})
         session = Session(env, config)
         newest = _newest(path, say) if start.resume else None
-        begin = _restored(session, newest) if newest else _fresh(session, learned)
+        begin = (
+            _restored(session, newest) if newest else _fresh(session, learned, steps)
+        )
         record_run(path, {"train": config, "env": setup.env}, shared, setup.hand)
         with MetricsLog(path, begin.iteration) as log:
             services = LoopServices(
@@ -130,6 +138,13 @@ def _learned(env: VectorEnv, setup: Setup, start: Start) -> TrainState | None:
     if start.warm_start is None:
         return None
     return started_from(train_template(env, setup.train.ppo), env, start.warm_start)
+
+
+def _counted(start: Start) -> int:
+    """Reads from where schedules go on, before anything is written."""
+    if start.warm_start is None or not start.keep_schedules:
+        return 0
+    return steps_done(start.warm_start)
 
 
 def _newest(path: Path, say: Callable[[str], None]) -> Path | None:
@@ -150,9 +165,11 @@ def _restored(session: Session, path: Path) -> StartPoint:
     return StartPoint(carry, saved.iteration, saved.meta["trained_s"], path)
 
 
-def _fresh(session: Session, learned: TrainState | None) -> StartPoint:
-    """Returns the state of a new run, with what was `learned` elsewhere."""
+def _fresh(session: Session, learned: TrainState | None, steps: int) -> StartPoint:
+    """Returns the state of a new run, with what was `learned` and counted elsewhere."""
     carry = session.start()
+    if steps:
+        carry = replace(carry, worlds=with_steps(carry.worlds, steps))
     if learned is not None:
         carry = replace(carry, train=strong(completed(learned, carry.train)))
     return StartPoint(carry)

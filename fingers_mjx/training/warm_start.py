@@ -12,10 +12,10 @@ from jaxtyping import Float
 from envs.errors import InputError
 from envs.hand.nominal import vendor_hand
 from fingers_deploy import Bundle, load_bundle
-from fingers_deploy.bundle import POLICY_FILE
 from fingers_deploy.manifest import Interface, Term
 from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import interface_of
+from fingers_mjx.policy.source import is_bundle
 from fingers_mjx.ppo.brax import PPONetworkParams
 from fingers_mjx.ppo.state import TrainState
 
@@ -47,7 +47,7 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
         InputError: networks of other sizes.
         BundleError: a damaged bundle, or one for another hand.
     """
-    if path.suffix != ".onnx" and not (path / POLICY_FILE).is_file():
+    if not is_bundle(path):
         found = warm_started(train, read(path))
         fresh, params = train.params.policy["params"], found.params.policy["params"]
         noise = {k: v for k, v in fresh.items() if k not in _LAYERS}

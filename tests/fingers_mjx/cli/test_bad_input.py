@@ -75,6 +75,13 @@ SETTINGS = [
     (["train", "crawl", "--out", "run"], ["run", "in use", "--resume"]),
     (["train", "crawl", "--out", "bundle/policy.onnx"], ["policy.onnx", "Not a dir"]),
     (["train", "crawl", "--warm-start", "no"], ["no", "checkpoint"]),
+    (["train", "crawl", "--schedules", "keep"], ["--schedules", "--warm-start RUN"]),
+    (["train", "crawl", "--schedules", "on"], ["--schedules", "on", "keep", "restart"]),
+    (
+        ["train", "crawl", "--warm-start", "bundle", "--schedules", "keep"],
+        ["--schedules keep", "bundle", "a run or checkpoint"],
+    ),
+    (["train", "--resume", "run", "--schedules", "keep"], ["--schedules", "--resume"]),
     (["train", "--resume", "bundle"], ["bundle", "no run", "fingers train"]),
     (["train", "--resume", "run", "--seed", "5"], ["run", "seed", "5", "0, as saved"]),
     (["train", "--resume", "run", "--hand", "x.yaml"], ["--hand", "x.yaml"]),
