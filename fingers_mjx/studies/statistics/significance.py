@@ -1,5 +1,7 @@
 """Tests over seeds: the paired t test, and Holm's correction of several together."""
 
+from typing import Any
+
 import numpy as np
 from jaxtyping import Float
 from scipy.stats import ttest_1samp
@@ -28,8 +30,8 @@ def paired_p(
     steady = np.ptp(difference, axis=-1, keepdims=True) == 0
     # SciPy warns of differences without a spread, whose p is undefined anyway.
     spread = np.where(steady, np.arange(n), difference)
-    _, p = ttest_1samp(spread, 0.0, axis=-1)
-    return np.where(steady[..., 0], np.nan, p)
+    tested: Any = ttest_1samp(spread, 0.0, axis=-1)
+    return np.where(steady[..., 0], np.nan, tested.pvalue)
 
 
 def holm(p: Float[np.ndarray, " m"]) -> Float[np.ndarray, " m"]:
