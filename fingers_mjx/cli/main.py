@@ -15,11 +15,11 @@ from typing import NoReturn
 
 from fingers_mjx.cli.installation import check_installation, check_places
 
-COMMANDS = ("train", "evaluate", "export", "play", "hand")
+COMMANDS = ("train", "evaluate", "sweep", "export", "play", "hand")
 SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 
-BAD_INPUT, DISK_FULL, KEYBOARD = 2, 4, 130
+BAD_INPUT, KEYBOARD = 2, 130
 _EXTRAS = {
     "matplotlib": "viz",
     "imageio_ffmpeg": "viz",
@@ -98,17 +98,9 @@ def _status(error: Exception) -> int | None:
         return BAD_INPUT
     if isinstance(error, ModuleNotFoundError):
         return BAD_INPUT if error.name in _EXTRAS else None
-    if (status := getattr(error, "exit_code", None)) is not None:
-        return status
-    from envs.errors import InputError
-    from fingers_deploy import BundleError
-    from fingers_mjx.runs.files import is_full
+    from fingers_mjx.training.errors import exit_status
 
-    if is_full(error):
-        return DISK_FULL
-    if isinstance(error, InputError | BundleError | OSError):
-        return BAD_INPUT
-    return None
+    return exit_status(error)
 
 
 def _sentence(error: Exception) -> str:

@@ -63,7 +63,7 @@ def open_run(path: Path, resume: bool) -> Iterator[Path]:
     _check_purpose(path, resume)
     for directory in (path, path / "checkpoints", path / "eval"):
         directory.mkdir(parents=True, exist_ok=True)
-    with _locked(path / LOCK):
+    with locked(path / LOCK, "a run that no other process is writing to"):
         _check_purpose(path, resume)
         yield path
 
@@ -108,7 +108,7 @@ def check_bound(
     Raises:
         InputError: naming the first field that differs, its saved and current value.
     """
-    saved, now = _flat(saved_bound(path)), _flat(json.loads(_json(current)))
+    saved, now = flat(saved_bound(path)), flat(json.loads(_json(current)))
     for name in sorted((saved.keys() | now.keys()) - set(free)):
         was, found = saved.get(name, "nothing"), now.get(name, "nothing")
         if was != found:
@@ -157,28 +157,35 @@ def _read_run(path: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def _locked(path: Path) -> Iterator[None]:
-    """Holds the lock file `path`; the system frees it however the process ends."""
+def locked(path: Path, valid: str) -> Iterator[None]:
+    """Holds the lock file `path`; the system frees it however the process ends.
+
+    Args:
+        path: the file, which stays.
+        valid: what would be valid where another process holds it.
+
+    Raises:
+        InputError: another process holds it; names the directory of `path`.
+    """
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:
-            valid = "a run that no other process is writing to"
             raise InputError(path.parent, "", "a run in progress", valid) from None
         yield
     finally:
         os.close(handle)
 
 
-def _flat(tree: Any, prefix: str = "") -> dict[str, Any]:
-    """Returns the leaves of nested dicts by dotted name."""
+def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
+    """Returns the leaves of nested mappings by dotted name."""
     if not isinstance(tree, Mapping):
         return {prefix: tree}
-    flat: dict[str, Any] = {}
+    found: dict[str, Any] = {}
     for name, value in tree.items():
-        flat |= _flat(value, f"{prefix}.{name}" if prefix else name)
-    return flat
+        found |= flat(value, f"{prefix}.{name}" if prefix else name)
+    return found
 
 
 def _json(value: Any) -> bytes:

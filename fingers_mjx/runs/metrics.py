@@ -3,6 +3,7 @@
 import json
 import math
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from fingers_mjx.runs.files import room_for, write_whole
 
 Row = Mapping[str, Any]
 _STEP, _TIME = "iteration", "time_s"
+_TAIL_BYTES = 1 << 16
 
 
 class MetricsLog:
@@ -76,6 +78,23 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
         except ValueError:
             break
     return rows
+
+
+def last_row(path: Path) -> dict[str, Any]:
+    """Returns the last whole row of a `metrics.jsonl`, empty if there is none.
+
+    Only the end of the file is read.
+    """
+    if not path.exists():
+        return {}
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - _TAIL_BYTES))
+        lines = file.read().decode(errors="replace").splitlines()
+    for line in reversed(lines):
+        with suppress(ValueError):
+            if isinstance(row := json.loads(line), dict):
+                return row
+    return {}
 
 
 def _line(row: Row) -> str:

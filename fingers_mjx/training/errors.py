@@ -2,6 +2,12 @@
 
 from pathlib import Path
 
+from envs.errors import InputError
+from fingers_deploy import BundleError
+from fingers_mjx.runs.files import OutOfSpace, is_full
+
+BAD_INPUT = 2
+
 
 class Diverged(RuntimeError):
     """Learning broke down: too many updates in a row were not finite (status 3).
@@ -44,3 +50,12 @@ class Interrupted(RuntimeError):
             f"stopped after iteration {iteration}; saved in {checkpoint}; "
             "go on with --resume"
         )
+
+
+def exit_status(error: Exception) -> int | None:
+    """Returns the exit status of an error that a user can meet, None for a fault."""
+    if (status := getattr(error, "exit_code", None)) is not None:
+        return status
+    if is_full(error):
+        return OutOfSpace.exit_code
+    return BAD_INPUT if isinstance(error, InputError | BundleError | OSError) else None

@@ -1,0 +1,1 @@
+"""Sweeps: configurations × seeds × stages, trained and evaluated one by one."""

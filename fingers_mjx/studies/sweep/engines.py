@@ -1,0 +1,19 @@
+"""Engines by name."""
+
+from pathlib import Path
+
+from fingers_mjx.studies.sweep.engine import Engine, local
+from fingers_mjx.studies.sweep.spec import Sweep
+
+
+def make_engine(spec: Sweep, root: Path) -> Engine:
+    """Returns the engine that a resolved sweep names.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep, absolute.
+
+    Raises:
+        InputError: the engine is not installed, or its cluster cannot be reached.
+    """
+    return local(spec, root)

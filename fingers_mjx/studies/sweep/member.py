@@ -1,0 +1,124 @@
+"""Trains and evaluates a member of a sweep, as far as that has not been done."""
+
+import dataclasses
+import shutil
+from collections.abc import Sequence
+from pathlib import Path
+
+from fingers_mjx.evaluation import source as evaluating
+from fingers_mjx.policy.interface import identity
+from fingers_mjx.policy.source import load_source
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.setup import make_env, overridden
+from fingers_mjx.studies.sweep.outcome import is_evaluated
+from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
+from fingers_mjx.studies.sweep.spec import Evaluation, Sweep
+from fingers_mjx.training.progress import OnProgress
+from fingers_mjx.training.train import Start, train
+from fingers_mjx.training.watchdog import Watchdog
+
+HANG_FILE = "hang.txt"
+
+
+def train_members(
+    spec: Sweep, root: Path, keys: Sequence[Key], on_progress: OnProgress
+) -> dict[Key, Exception]:
+    """Trains what is missing of the stages of members.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep.
+        keys: the members.
+        on_progress: called with the events of `fingers_mjx.training.progress`.
+
+    Returns:
+        What ended single members, while the others went on.
+
+    Raises:
+        InputError, Diverged, Interrupted, OutOfSpace: as `fingers_mjx.training.train`.
+    """
+    (key,) = keys
+    before = None
+    for training in trainings(spec, root, key):
+        if start := start_of(training, before):
+            _train(training, start, on_progress)
+        before = training.path
+    return {}
+
+
+def _train(training: Training, start: Start, on_progress: OnProgress) -> None:
+    """Trains one run."""
+    setup = training.setup
+    env = make_env(setup, setup.train.num_envs, setup.train.backend)
+    train(
+        env,
+        setup,
+        training.path,
+        start=start,
+        identity=identity(env),
+        on_progress=on_progress,
+    )
+
+
+def start_of(training: Training, before: Path | None) -> Start | None:
+    """Returns how a stage begins or goes on, None if it is finished.
+
+    A run that was killed before its first checkpoint begins again.
+
+    Args:
+        training: the stage.
+        before: run directory of the stage before.
+    """
+    saved = checkpoint.checkpoints(training.path / "checkpoints")
+    if not saved:
+        shutil.rmtree(training.path, ignore_errors=True)
+        return Start(warm_start=before)
+    if int(saved[-1].name) >= training.setup.train.iterations:
+        return None
+    return Start(resume=True)
+
+
+def evaluate_member(spec: Sweep, root: Path, key: Key) -> None:
+    """Evaluates the last stage of a member, unless that has been done.
+
+    Raises:
+        InputError: as `evaluate_run`.
+    """
+    last = trainings(spec, root, key)[-1]
+    if not is_evaluated(last.path):
+        evaluate_run(last.path, spec.evaluate, last.setup.train.hang_limit_s)
+
+
+def evaluate_run(run: Path, wanted: Evaluation, hang_limit_s: float) -> None:
+    """Evaluates a trained run into its directory, as `fingers eval` does.
+
+    Args:
+        run: run directory.
+        wanted: episodes, seed, backend and settings.
+        hang_limit_s: as in training; a process that hangs is ended.
+
+    Raises:
+        InputError: settings that do not fit, or no space for the contacts.
+    """
+    loaded = load_source(run)
+    settings = assignments(wanted.set)
+    setup = overridden(evaluating.as_deployed(loaded.setup), settings)
+    source = dataclasses.replace(loaded, setup=setup)
+    backend = wanted.backend or setup.train.backend
+    with Watchdog(run / HANG_FILE, hang_limit_s) as watchdog:
+        table = evaluating.evaluate_source(
+            source,
+            wanted.episodes,
+            wanted.seed,
+            backend,
+            progress=lambda done, total: watchdog.beat(),
+        )
+    conditions = {
+        "backend": backend,
+        "steps": None,
+        "command": None,
+        "nominal": False,
+        "settings": settings,
+    }
+    about = evaluating.document(source, table, wanted.seed, conditions)
+    evaluating.write_evaluation(run / "eval", table, about)

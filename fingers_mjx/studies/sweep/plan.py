@@ -1,0 +1,131 @@
+"""From a resolved sweep to the trainings of each member."""
+
+import dataclasses
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+from envs.errors import InputError
+from fingers_mjx.ppo.config import preset
+from fingers_mjx.runs.setup import Setup, new_setup, overridden
+from fingers_mjx.studies.sweep.search import Overrides
+from fingers_mjx.studies.sweep.spec import Stage, Sweep, seed_list
+
+RUNS = "runs"
+SETTINGS = "sweep"
+"""What errors name before it is known which file the settings are from."""
+LOG_FILE = "log.txt"
+
+
+class Key(NamedTuple):
+    """Which member: a configuration and a seed."""
+
+    configuration: str
+    seed: int
+
+    def __str__(self) -> str:
+        return f"{self.configuration}/{self.seed}"
+
+    def directory(self, root: Path) -> Path:
+        """Returns the directory of the member in a sweep."""
+        return root / RUNS / self.configuration / str(self.seed)
+
+
+@dataclass(frozen=True)
+class Training:
+    """One stage of one member.
+
+    Attributes:
+        path: its run directory.
+        setup: settings and hand.
+        keep_schedules: whether curricula go on where the stage before ended.
+    """
+
+    path: Path
+    setup: Setup
+    keep_schedules: bool
+
+
+def keys(spec: Sweep) -> list[Key]:
+    """Returns all members of a resolved sweep before promotion, seed by seed.
+
+    So whatever is done after a part of the time has all configurations in it.
+    """
+    seeds = seed_list(spec.seeds)
+    return [Key(name, seed) for seed in seeds for name in spec.configurations]
+
+
+def trainings(spec: Sweep, root: Path, key: Key) -> list[Training]:
+    """Returns the stages of a member in turn.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep, in which its hands are.
+        key: the member.
+
+    Raises:
+        InputError: a setting that does not exist or fit, naming its place in the sweep.
+    """
+    return [
+        Training(
+            key.directory(root) / stage.name,
+            _setup(spec, root, key, stage),
+            stage.schedules == "keep",
+        )
+        for stage in spec.stages
+    ]
+
+
+def check_sweep(spec: Sweep, root: Path, source: Path) -> None:
+    """Raises InputError at the first setting of any member that cannot work.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep.
+        source: file of the specification, which errors name.
+    """
+    seed = seed_list(spec.seeds)[0]
+    try:
+        for configuration in spec.configurations:
+            last = trainings(spec, root, Key(configuration, seed))[-1]
+            _overridden(last.setup, {"evaluate.set": spec.evaluate.set})
+    except InputError as error:
+        if error.source != SETTINGS:
+            raise
+        raise InputError(source, error.field, error.found, error.valid) from error
+
+
+def _setup(spec: Sweep, root: Path, key: Key, stage: Stage) -> Setup:
+    """Returns the settings of one stage; a configuration's count before a stage's."""
+    own = dict(spec.configurations[key.configuration])
+    hand = own.pop("hand", spec.hand)
+    train = preset(spec.preset or "", spec.task)
+    train = dataclasses.replace(train, backend=spec.backend or "", seed=key.seed)
+    setup = new_setup(train, root / str(hand) if hand else None)
+    places = {
+        "set": spec.set,
+        f"stages.{stage.name}.set": stage.set,
+        f"configurations.{key.configuration}": own,
+    }
+    return _overridden(setup, places)
+
+
+def _overridden(setup: Setup, places: dict[str, Overrides]) -> Setup:
+    """Returns `setup` with settings, those of later places before earlier ones.
+
+    Raises:
+        InputError: names the place in the sweep that a setting came from.
+    """
+    settings = {name: value for of in places.values() for name, value in of.items()}
+    try:
+        return overridden(setup, assignments(settings))
+    except InputError as error:
+        given = [place for place, of in places.items() if error.field in of]
+        field = ".".join([*given[-1:], error.field])
+        raise InputError(SETTINGS, field, error.found, error.valid) from error
+
+
+def assignments(settings: Overrides) -> list[str]:
+    """Returns settings as `--set` takes them; JSON is YAML."""
+    return [f"{name}={json.dumps(value)}" for name, value in settings.items()]

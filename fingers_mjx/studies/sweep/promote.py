@@ -1,0 +1,57 @@
+"""Promotion: the best configurations of a sweep are trained on more seeds."""
+
+import json
+import math
+from collections.abc import Mapping
+from pathlib import Path
+
+from envs.errors import InputError, one_of
+from fingers_mjx.evaluation.files import SUMMARY_FILE
+from fingers_mjx.studies.sweep.manifest import Manifest, Member
+from fingers_mjx.studies.sweep.plan import Key
+from fingers_mjx.studies.sweep.spec import Promotion, Sweep, seed_list
+
+
+def promoted(spec: Sweep, root: Path, manifest: Manifest) -> list[Key]:
+    """Returns the members that promotion adds.
+
+    Configurations are ranked by the mean, over the seeds of the sweep, of the mean over
+    episodes; seeds that promotion has added do not enter, so that the choice stays.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep.
+        manifest: all members of its seeds are done or have diverged.
+
+    Raises:
+        InputError: the evaluation has no such measure.
+    """
+    if spec.promote is None:
+        return []
+    seeds = seed_list(spec.seeds)
+    found: dict[str, list[float]] = {}
+    for member in manifest.members:
+        if member.state == "done" and member.seed in seeds:
+            value = _measure(root, member, spec.promote.by)
+            found.setdefault(member.configuration, []).append(value)
+    best = _best(found, spec.promote)
+    more = seed_list(spec.promote.seeds, max(seeds))
+    return [Key(name, seed) for seed in more for name in best]
+
+
+def _best(found: Mapping[str, list[float]], promote: Promotion) -> list[str]:
+    """Returns the best configurations; those without a value are none of them."""
+    means = {name: sum(x) / len(x) for name, x in found.items()}
+    known = [name for name, mean in means.items() if math.isfinite(mean)]
+    sign = -1.0 if promote.best == "highest" else 1.0
+    return sorted(known, key=lambda name: sign * means[name])[: promote.top]
+
+
+def _measure(root: Path, member: Member, name: str) -> float:
+    """Returns a measure of a member; NaN where it is undefined."""
+    path = root / member.run / "eval" / SUMMARY_FILE
+    measures = json.loads(path.read_text(encoding="utf-8"))["measures"]
+    if name not in measures:
+        raise InputError(root, "promote.by", name, one_of(measures, name))
+    mean = measures[name]["mean"]
+    return math.nan if mean is None else float(mean)

@@ -1,0 +1,182 @@
+"""From the file that a user writes to a sweep in which every default is resolved.
+
+The resolved sweep stands in `spec.yaml` of its directory, with explicit configurations
+in place of a search, and its hands beside it. It reads back to itself.
+"""
+
+import dataclasses
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from envs.config.atomic_file import PARTIAL, write_atomic
+from envs.config.typed import dump_yaml, load_yaml, to_dict
+from envs.errors import InputError
+from envs.hand.hand_file import hand_yaml, load_hand_file
+from fingers_mjx.runs.directory import flat
+from fingers_mjx.studies.sweep.plan import check_sweep
+from fingers_mjx.studies.sweep.search import Overrides, gridded, sampled
+from fingers_mjx.studies.sweep.spec import Sweep, free_names, seed_list
+
+SPEC_FILE, HANDS, LOCK_FILE = "spec.yaml", "hands", "sweep.lock"
+BASE = "base"
+"""Name of the configuration of a sweep that names none."""
+ADDABLE = ("configurations", "seeds")
+
+
+def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, str]]:
+    """Returns the sweep with its defaults, and the hand files that it names.
+
+    Args:
+        spec: as read from `source`.
+        source: file of the specification; hands are named relative to it.
+        backend: physics backend of this machine.
+
+    Returns:
+        The sweep and the hand files to be kept, by their names in it.
+
+    Raises:
+        InputError: a hand file that cannot be read, or configurations by two ways with
+            the same name.
+    """
+    hands: dict[str, str] = {}
+
+    def kept(path: Any) -> str | None:
+        if path is None:
+            return None
+        hand = load_hand_file(source.parent / path)
+        name = f"{HANDS}/{hand.sha256[:12]}.yaml"
+        hands[name] = hand_yaml(hand)
+        return name
+
+    backend = spec.backend or backend
+    engine = spec.engine or ("population" if backend == "warp" else "local")
+    evaluate = spec.evaluate
+    made = dataclasses.replace(
+        spec,
+        preset=spec.preset or ("fast" if backend == "warp" else "cpu"),
+        hand=kept(spec.hand),
+        backend=backend,
+        configurations={
+            name: {k: kept(v) if k == "hand" else v for k, v in settings.items()}
+            for name, settings in _configurations(spec, source).items()
+        },
+        search=None,
+        grid=None,
+        seeds=seed_list(spec.seeds),
+        evaluate=dataclasses.replace(evaluate, backend=evaluate.backend or backend),
+        engine=engine,
+        threads=spec.threads or (None if engine == "population" else 1),
+    )
+    return made, hands
+
+
+def machine_backend() -> str:
+    """Returns the backend that `fingers train` takes by itself on this machine.
+
+    Asked of a process of its own: one that has looked for a GPU keeps part of it.
+    """
+    program = "from envs.physics.backends import default_backend as d; print(d())"
+    command = [sys.executable, "-c", program]
+    environment = {**os.environ, "TF_CPP_MIN_LOG_LEVEL": "3"}
+    done = subprocess.run(
+        command, env=environment, capture_output=True, text=True, check=True
+    )
+    return done.stdout.split()[-1]
+
+
+def saved_sweep(directory: Path) -> Sweep | None:
+    """Returns the sweep of a directory, None if there is none."""
+    path = directory / SPEC_FILE
+    return load_yaml(Sweep, path) if path.exists() else None
+
+
+def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
+    """Resolves a sweep, checks it, and writes it and its hands to its directory.
+
+    Args:
+        written: as read from `source`.
+        source: file of the specification.
+        root: directory of the sweep.
+
+    Raises:
+        InputError: a setting that cannot work, or that is not that of the sweep in the
+            directory; a directory with something else in it.
+    """
+    saved = saved_sweep(root)
+    backend = written.backend or (saved.backend if saved else None)
+    spec, hands = resolved(written, source, backend or machine_backend())
+    if saved is None:
+        _check_empty(root)
+    else:
+        check_only_added(saved, spec, source)
+    for name, text in hands.items():
+        (root / name).parent.mkdir(exist_ok=True)
+        write_atomic(root / name, text)
+    check_sweep(spec, root, source)
+    write_atomic(root / SPEC_FILE, dump_yaml(spec))
+    return spec
+
+
+def _check_empty(root: Path) -> None:
+    """Refuses to begin a sweep among other files."""
+    ours = (LOCK_FILE, HANDS)
+    names = [p.name for p in root.iterdir() if not p.name.startswith(PARTIAL)]
+    if others := sorted(set(names) - set(ours)):
+        raise InputError(root, "", others[0], "a new or empty directory")
+
+
+def check_only_added(saved: Sweep, spec: Sweep, source: Path) -> None:
+    """Refuses a sweep that is not the saved one with more seeds or configurations.
+
+    How members are trained (engine, processes) may change too, as does not change them.
+
+    Raises:
+        InputError: naming the first field that differs.
+    """
+    for name in ADDABLE:
+        was, found = _addable(saved, name), _addable(spec, name)
+        for key, value in was.items():
+            if key not in found or found[key] != value:
+                now = found.get(key, "nothing")
+                raise _changed(source, f"{name}.{key}", now, value)
+    others = {f.name for f in dataclasses.fields(Sweep)} - {*ADDABLE, *free_names()}
+    was, found = (
+        flat({k: v for k, v in to_dict(s).items() if k in others})
+        for s in (saved, spec)
+    )
+    for key in sorted(was.keys() | found.keys()):
+        if was.get(key) != found.get(key):
+            now, before = found.get(key, "nothing"), was.get(key, "nothing")
+            raise _changed(source, key, now, before)
+
+
+def _configurations(spec: Sweep, source: Path) -> dict[str, Overrides]:
+    """Returns all configurations, those of search and grid after those with names."""
+    found = dict(spec.configurations)
+    for more in (
+        sampled(spec.search) if spec.search else {},
+        gridded(spec.grid) if spec.grid else {},
+    ):
+        if twice := sorted(found.keys() & more.keys()):
+            valid = "a name that search and grid do not give"
+            raise InputError(source, f"configurations.{twice[0]}", twice[0], valid)
+        found |= more
+    return found or {BASE: {}}
+
+
+def _addable(spec: Sweep, name: str) -> dict[Any, Any]:
+    value = getattr(spec, name)
+    return value if isinstance(value, dict) else {seed: seed for seed in value}
+
+
+def _changed(source: Path, field: str, found: Any, was: Any) -> InputError:
+    shown = [json.dumps(x, default=list) for x in (found, was)]
+    valid = (
+        f"{shown[1]}, as the sweep was begun: seeds and configurations can be added, "
+        "nothing taken away or changed; another directory takes another sweep"
+    )
+    return InputError(source, field, shown[0], valid)

@@ -1,0 +1,75 @@
+"""A sweep of pretended trainings, for the tests of its parent."""
+
+import json
+import sys
+from pathlib import Path
+
+from support.sweep_worker import planned
+
+from envs.config.typed import from_dict
+from fingers_mjx.studies.sweep.book import Book
+from fingers_mjx.studies.sweep.engine import local
+from fingers_mjx.studies.sweep.resolve import keep_sweep
+from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
+from fingers_mjx.studies.sweep.spec import Sweep
+
+WORKER = (sys.executable, str(Path(__file__).with_name("sweep_worker.py")))
+TINY = {
+    "num_envs": 8,
+    "iterations": 3,
+    "log_every": 1,
+    "checkpoint_every": 1,
+    "ppo.unroll_length": 4,
+    "ppo.epochs": 1,
+    "ppo.minibatches": 2,
+    "ppo.actor_layers": [8],
+    "ppo.critic_layers": [8],
+    "env.episode_s": 1.0,
+}
+
+
+def written(**changes):
+    """Returns a sweep of 2 configurations × 2 seeds as plain data, with changes."""
+    return {
+        "task": "crawl",
+        "preset": "cpu",
+        "backend": "cpu",
+        "set": TINY,
+        "configurations": {"plain": {}, "lift": {"env.weights.lift": 5.0}},
+        "seeds": 2,
+        "evaluate": {"episodes": 4},
+        "engine": "local",
+        "processes": 2,
+    } | changes
+
+
+def sweep(**changes):
+    return from_dict(Sweep, written(**changes), "spec.yaml")
+
+
+def plan_faults(root, faults):
+    """Lets members fail: which fault in which of their attempts."""
+    planned(root).write_text(json.dumps(faults), "utf-8")
+
+
+def run_fake(root, **changes):
+    """Runs a sweep with pretended trainings and returns its manifest."""
+    with sweep_lock(root):
+        spec = keep_sweep(sweep(**changes), root / "spec.yaml", root)
+        book = Book(spec, root, lambda member: None)
+        return run_sweep(book, local(spec, root, WORKER), lambda event: None)
+
+
+def states(manifest):
+    return {str(m.key): m.state for m in manifest.members}
+
+
+def journal(root):
+    """Returns how often each member began and ended."""
+    path = root / "journal.txt"
+    lines = path.read_text("utf-8").splitlines() if path.exists() else []
+    return [tuple(line.split()[:2]) for line in lines]
+
+
+if __name__ == "__main__":
+    run_fake(Path(sys.argv[1]))
