@@ -56,7 +56,7 @@ def local(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engine:
 
     def launch(keys: Sequence[Key]) -> Job:
         words, log = worker_words(command, root, keys)
-        environment = worker_environment(spec.threads)
+        environment = worker_environment(spec.threads, spec.backend)
         return Process(words, log, environment, spec.threads)
 
     return Engine(spec.processes or default_processes(spec), one_by_one, launch)

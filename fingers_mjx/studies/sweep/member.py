@@ -72,7 +72,8 @@ def start_of(training: Training, before: Path | None) -> Start | None:
     saved = checkpoint.checkpoints(training.path / "checkpoints")
     if not saved:
         shutil.rmtree(training.path, ignore_errors=True)
-        return Start(warm_start=before)
+        keep = training.keep_schedules
+        return Start(warm_start=before, keep_schedules=keep)
     if int(saved[-1].name) >= training.setup.train.iterations:
         return None
     return Start(resume=True)

@@ -52,7 +52,8 @@ class Process:
         """Returns the exit status, negative for a signal, or None while it runs."""
         status = self._process.poll()
         if status is not None:
-            self._process.stdin and self._process.stdin.close()
+            if self._process.stdin is not None:
+                self._process.stdin.close()
             self._cores.free()
         return status
 
@@ -105,16 +106,21 @@ class Cores:
             os.close(handle)
 
 
-def worker_environment(threads: int | None) -> dict[str, str]:
+def worker_environment(threads: int | None, backend: str | None) -> dict[str, str]:
     """Returns the variables of a worker.
 
-    XLA splits sums among its threads, so that the last bits of a result depend on their
-    number: it is fixed, whichever machine a worker gets to.
+    XLA and BLAS split sums among their threads, so that the last bits of a result
+    depend on their number: it is fixed, whichever machine a worker gets to.
 
     Args:
-        threads: of XLA; all cores if None.
+        threads: of a worker; as many as it finds cores if None.
+        backend: physics backend; only Warp's workers look for a GPU.
     """
     here = str(Path(__file__).parents[3])
     path = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH", ""))))
     found = {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1", "TF_CPP_MIN_LOG_LEVEL": "3"}
-    return found | ({} if threads is None else {"PJRT_NPROC": str(threads)})
+    if backend != "warp":
+        found["JAX_PLATFORMS"] = "cpu"
+    if threads is not None:
+        found |= dict.fromkeys(("PJRT_NPROC", "OMP_NUM_THREADS"), str(threads))
+    return found

@@ -162,6 +162,9 @@ def _check_names(spec: Sweep) -> None:
     stages = [stage.name for stage in spec.stages]
     for number, name in enumerate(stages):
         _check_name(f"stages.{number}.name", name)
+        if number == 0 and spec.stages[0].schedules == "keep":
+            valid = "restart: there is no stage before"
+            raise InputError("sweep", "stages.0.schedules", "keep", valid)
         if name in stages[:number]:
             raise InputError("sweep", f"stages.{number}.name", name, "another name")
     for name in spec.configurations:

@@ -39,6 +39,7 @@ def test_what_may_change_between_starts():
         ({"stages": [*STAGES, {"name": "walk"}]}, "stages.2.name", "another name"),
         ({"stages": [{"name": "a/b"}]}, "stages.0.name", "letters"),
         ({"stages": [{"schedules": "go"}]}, "stages.0.schedules", "keep, restart"),
+        ({"stages": [{"schedules": "keep"}]}, "stages.0.schedules", "no stage before"),
         ({"configurations": {"..": {}}}, "configurations", "letters"),
         ({"configurations": {"a": {"seed": 3}}}, "configurations.a.seed", "setting"),
         ({"set": {"hand": "x.yaml"}}, "set.hand", "setting"),
