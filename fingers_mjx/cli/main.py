@@ -1,8 +1,8 @@
 """The command `fingers`: train, evaluate, export, play, show the hand, demonstrate.
 
 Exit status: 0 done; 2 bad input; 3 learning diverged; 4 no room on the disk; 5 a sweep
-that is over and lacks members; 6 an installation that cannot work; 75 stopped by a signal after a checkpoint, go on with
---resume; 130 stopped by the keyboard.
+that is over and lacks members; 6 an installation that cannot work; 75 stopped by a
+signal after a checkpoint, go on with --resume; 130 stopped by the keyboard.
 """
 
 import argparse
@@ -47,8 +47,8 @@ def make_parser() -> argparse.ArgumentParser:
         prog="fingers",
         description="Teach an anthropomorphic hand to walk on its fingertips.",
         epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 5 members "
-        "of a sweep missing, 6 an installation that cannot work, 75 stopped by a signal after saving (go on "
-        "with --resume).",
+        "of a sweep missing, 6 an installation that cannot work, 75 stopped by a "
+        "signal after saving (go on with --resume).",
         allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)

@@ -47,7 +47,7 @@ def test_how_a_worker_ended_decides(tmp_path, run, status, said, verdict, words)
     assert said or "amid iteration 3" in found.reason
 
 
-def test_a_hang_is_told_from_a_signal_by_the_watchdog(tmp_path, run):
+def test_a_hang_differs_from_a_signal_by_the_watchdog(tmp_path, run):
     log = KEY.directory(tmp_path) / LOG_FILE
     log.write_text("no progress for 300 s; stacks in hang.txt\nFile …\n", "utf-8")
     found = outcome(tmp_path, KEY, run, 75)
