@@ -7,13 +7,27 @@ QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 	tests/test_documentation.py tests/rewards
 
 .DEFAULT_GOAL := help
-.PHONY: help sync format check test test-slow test-gpu demo battery bench build clean
+.PHONY: help sync cuda12 cuda13 format check test test-slow test-gpu test-versions demo \
+	battery bench build clean
+
+# The ends of what pyproject.toml allows; a version, or the path of an interpreter.
+OLDEST_PYTHON := 3.11
+NEWEST_PYTHON := 3.12
+VERSIONS := tests/envs tests/rewards tests/fingers_mjx/ppo tests/fingers_mjx/training \
+	tests/fingers_mjx/runs tests/fingers_mjx/export
 
 help: ## List the targets
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "%-10s %s\n", $$1, $$2}'
+	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "%-13s %s\n", $$1, $$2}'
 
 sync: $(filter .uv/bin/uv,$(UV)) ## Install the locked dependencies into .venv/
 	@$(UV) sync --locked --inexact --quiet
+
+# Exactly these: two CUDA plugins side by side would not start.
+cuda12: $(filter .uv/bin/uv,$(UV)) ## As sync, with all for an NVIDIA GPU, driver 525 on
+	@$(UV) sync --locked --quiet --extra cuda12
+
+cuda13: $(filter .uv/bin/uv,$(UV)) ## As sync, with all for an NVIDIA GPU, driver 580 on
+	@$(UV) sync --locked --quiet --extra cuda13
 
 format: sync ## Rewrite the code in the project's style
 	$(RUN) ruff check --fix .
@@ -32,9 +46,18 @@ test: sync ## All tests for two CPU cores
 test-slow: sync ## The large versions of the tests; they print their seeds
 	$(RUN) pytest -m slow
 
-test-gpu: sync ## The tests that need an NVIDIA GPU
-	$(UV) sync --locked --inexact --quiet --extra warp
+test-gpu: sync ## The tests that need an NVIDIA GPU, after make cuda12 or cuda13
 	$(RUN) pytest -m gpu
+
+test-versions: $(filter .uv/bin/uv,$(UV)) ## Tests with the oldest and newest JAX allowed
+	$(UV) venv --quiet --clear --python $(OLDEST_PYTHON) build/oldest
+	$(UV) pip install --quiet --python build/oldest --resolution lowest-direct \
+		--group dev --editable '.[viz,data]' --editable deploy
+	build/oldest/bin/python -m pytest -q -n 2 --dist loadfile $(VERSIONS)
+	$(UV) venv --quiet --clear --python $(NEWEST_PYTHON) build/newest
+	$(UV) pip install --quiet --python build/newest --upgrade \
+		--group dev --editable '.[viz,data]' --editable deploy
+	build/newest/bin/python -m pytest -q -n 2 --dist loadfile $(VERSIONS)
 
 demo: sync ## The walking hand: evaluate, play, train, export, one report
 	$(RUN) fingers demo

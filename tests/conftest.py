@@ -7,6 +7,10 @@ import pytest
 from jaxtyping import config, install_import_hook
 from support import shapes
 
+from envs.rounding import fix_rounding
+
+fix_rounding()  # as the commands do
+
 # Before any test imports them: every array is checked against its annotation.
 CHECKER = f"{shapes.__name__}.{shapes.check_arrays.__name__}"
 SHAPED = ["rewards", "envs", "sysid"]

@@ -35,3 +35,14 @@ def test_the_locked_versions_are_those_that_the_package_allows():
         assert requirement.specifier.contains(versions[requirement.name])
     (onnx,) = map(Requirement, extras["onnx"])
     assert not onnx.specifier.contains("1.21.0")  # dies on the robot's processor
+
+
+def test_the_bounds_of_the_robot_are_its_own():
+    lines = (DEPLOY / "robot-limits.txt").read_text().splitlines()
+    limits = [Requirement(line) for line in lines if not line.startswith("#")]
+    versions = locked()
+    assert limits
+    assert all(limit.specifier.contains(versions[limit.name]) for limit in limits)
+    root = (DEPLOY.parent / "uv.lock").read_text()
+    training = {p["name"]: p["version"] for p in tomllib.loads(root)["package"]}
+    assert not limits[0].specifier.contains(training[limits[0].name])

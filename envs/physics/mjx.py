@@ -183,7 +183,7 @@ def _array(x: Any) -> Any:
 def _check_warp() -> None:
     if not quiet_mjx.WARP_INSTALLED:
         found = quiet_mjx.IMPORT_MESSAGES
-        raise InputError("backend", "warp", found, 'pip install "fingers-mjx[warp]"')
+        raise InputError("backend", "warp", found, 'pip install "fingers-mjx[cuda12]"')
 
 
 def _overflow_type() -> Any:

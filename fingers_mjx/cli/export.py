@@ -15,6 +15,7 @@ def add(commands) -> None:
         "Write the policy of a run as a bundle. policy.onnx, manifest.json, "
         "config.yaml and hand.yaml; fails if ONNX Runtime and JAX differ by more than "
         "1e-5.",
+        computes=False,
     )
     options.path(parser, "run_dir", metavar="RUN", help="run directory")
     what = "directory of the bundle; default RUN"

@@ -60,6 +60,7 @@ def _add_show(actions) -> None:
         "draw the stance from four sides",
         "Draws the stance from four sides, with the control frame V, fingertips, pad "
         "normals and support polygon.",
+        computes=False,
     )
     options.path(parser, "--out", metavar="DIR", default=Path("hand"))
     options.path(parser, "--hand", help="default: the paper's hand")
@@ -72,6 +73,7 @@ def _add_stance(actions) -> None:
         stance,
         "search the stance again",
         "Searches the stance, settles it for 4 s and prints it as JSON.",
+        computes=False,
     )
     options.seed(parser)
     what = "random starts of the search"
@@ -88,6 +90,7 @@ def _add_mjcf(actions) -> None:
         "write the hand as MJCF",
         "Writes the hand, standing, as one MJCF file: the model for fingers-deploy run "
         "--driver sim, or to look at in any MuJoCo viewer.",
+        computes=False,
     )
     options.path(parser, "-o", "--out", help="instead of stdout")
     options.path(parser, "--hand", help="default: the paper's hand")
@@ -102,6 +105,7 @@ def _add_import(actions) -> None:
         "Carries an MJCF of the hand, such as the vendor's with meshes, over into a "
         "hand file for --hand: kinematics, inertia, limits and gains are its own, "
         "collision shapes are fitted to it. Lists what it lacks.",
+        computes=False,
     )
     options.path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
     what = "YAML: joints, our names to the model's; palm_quat, where asked for"

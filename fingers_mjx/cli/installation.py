@@ -2,14 +2,15 @@
 
 import importlib.util
 import platform
+import tomllib
 from importlib import metadata
 from pathlib import Path
-
-from packaging.requirements import Requirement
-from packaging.specifiers import SpecifierSet
+from typing import Any
 
 DISTRIBUTION = "fingers-mjx"
 OURS = ("rewards", "envs", "sysid")
+ROOT = Path(__file__).parents[2]
+"""Directory from which `fingers_mjx` was imported."""
 
 
 class UnsupportedInstallation(RuntimeError):
@@ -18,27 +19,71 @@ class UnsupportedInstallation(RuntimeError):
     exit_code = 6
 
 
-def check_installation() -> None:
+def check_installation(root: Path = ROOT) -> None:
     """Checks the versions that this distribution asks for.
 
-    Brax fails on newer versions of JAX, some versions of jaxlib hang on the CPU, and an
-    installer that is asked for another package may well change them: so the versions
-    are checked whenever a command starts, against the distribution's own metadata.
+    Some versions of jaxlib hang on the CPU, and an installer that is asked for another
+    package may well change them: so the versions are checked whenever a command starts,
+    against `pyproject.toml` in a checkout, installed or not, and against the
+    distribution's own metadata elsewhere.
+
+    Args:
+        root: directory from which `fingers_mjx` was imported.
 
     Raises:
         UnsupportedInstallation: naming the first package, what was found and what
             would be valid.
     """
-    try:
-        own = metadata.metadata(DISTRIBUTION)
-    except metadata.PackageNotFoundError:
-        return  # run from a source tree without having been installed
-    check_python(platform.python_version(), own["Requires-Python"] or "")
-    for text in metadata.requires(DISTRIBUTION) or []:
+    if importlib.util.find_spec("packaging") is None:  # it compares the versions
+        raise UnsupportedInstallation(
+            "packaging: found nothing; valid: any version (pip install packaging)"
+        )
+    table = source_tree(root)
+    python, requirements = _installed() if table is None else _asked_by(table, root)
+    check_python(platform.python_version(), python)
+    for text in requirements:
         check_requirement(text)
 
 
-def check_places(root: Path = Path(__file__).parents[2]) -> None:
+def source_tree(root: Path = ROOT) -> dict[str, Any] | None:
+    """Returns `pyproject.toml` of the checkout from which our code runs, or None."""
+    try:
+        text = (root / "pyproject.toml").read_text("utf-8")
+    except FileNotFoundError:
+        return None
+    table = tomllib.loads(text)
+    return table if table.get("project", {}).get("name") == DISTRIBUTION else None
+
+
+def _installed() -> tuple[str, list[str]]:
+    """Python versions and requirements in the metadata of the installed package."""
+    try:
+        own = metadata.metadata(DISTRIBUTION)
+    except metadata.PackageNotFoundError as error:
+        raise UnsupportedInstallation(
+            f"{DISTRIBUTION}: found nothing that says what it needs; valid: an "
+            "installed package, or a whole checkout with its pyproject.toml"
+        ) from error
+    return own["Requires-Python"] or "", metadata.requires(DISTRIBUTION) or []
+
+
+def _asked_by(table: dict[str, Any], root: Path) -> tuple[str, list[str]]:
+    """The same of a source tree, without the package that it brings along itself."""
+    from packaging.requirements import Requirement
+
+    project, beside = table["project"], table["tool"]["uv"]["sources"]
+    for name in beside:
+        if importlib.util.find_spec(name.replace("-", "_")) is None:
+            place = root / "deploy"
+            raise UnsupportedInstallation(
+                f"{name}: found nothing; valid: {place}, installed or on PYTHONPATH"
+            )
+    texts = project["dependencies"]
+    foreign = [text for text in texts if Requirement(text).name not in beside]
+    return project["requires-python"], foreign
+
+
+def check_places(root: Path = ROOT) -> None:
     """Raises if one of our packages with a common name is somebody else's.
 
     Before anything of them is imported.
@@ -63,6 +108,8 @@ def check_places(root: Path = Path(__file__).parents[2]) -> None:
 
 def check_python(found: str, valid: str) -> None:
     """Raises if Python `found` is not one of `valid`, such as ">=3.11,<3.13"."""
+    from packaging.specifiers import SpecifierSet
+
     if not SpecifierSet(valid).contains(found, prereleases=True):
         raise UnsupportedInstallation(f"Python: found {found}; valid: {valid}")
 
@@ -77,6 +124,8 @@ def check_requirement(text: str) -> None:
     Raises:
         UnsupportedInstallation: naming the package, its version and the valid ones.
     """
+    from packaging.requirements import Requirement
+
     wanted = Requirement(text)
     if wanted.marker and not wanted.marker.evaluate({"extra": ""}):
         return

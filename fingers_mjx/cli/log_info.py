@@ -13,6 +13,7 @@ def add(actions) -> None:
         run,
         "show what a log holds",
         "Shows joints, columns, ranges, rates, gaps and clock steps.",
+        computes=False,
     )
     records.logs(parser, "log")
 

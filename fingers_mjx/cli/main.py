@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Sequence
 from typing import NoReturn
 
+from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
 from fingers_mjx.cli.installation import check_installation, check_places
 
 COMMANDS = ("train", "evaluate", "sweep", "export", "play", "hand")
@@ -79,9 +80,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_places()
         args = make_parser().parse_args(argv)
         check_installation()
-        # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
-        warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
-        importlib.import_module("envs.physics.quiet_mjx")
+        _note_idle_gpu(args)
+        _prepare_jax()
         return args.run(args)
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)
@@ -90,6 +90,24 @@ def main(argv: Sequence[str] | None = None) -> int:
         if status is None:
             raise
         return _say(_sentence(error), status)
+
+
+def _prepare_jax() -> None:
+    """Sets what must be set before JAX computes anything, and imports it quietly."""
+    from envs.rounding import fix_rounding
+
+    fix_rounding()
+    # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
+    warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
+    importlib.import_module("envs.physics.quiet_mjx")
+
+
+def _note_idle_gpu(args: argparse.Namespace) -> None:
+    """Says once that a command leaves a GPU idle that nobody declined."""
+    backend = getattr(args, "backend", None)
+    if args.computes and (sentence := idle_gpu(backend)):
+        print(f"fingers: {sentence}", file=sys.stderr)
+        quiet_jax()
 
 
 def _status(error: Exception) -> int | None:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
+from fingers_mjx.cli.gpu import install_command
 
 if TYPE_CHECKING:
     from fingers_mjx.ppo.config import TrainConfig
@@ -20,13 +21,27 @@ POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 
 
 def command(
-    commands, name: str, run: Callable, summary: str, details: str
+    commands,
+    name: str,
+    run: Callable,
+    summary: str,
+    details: str,
+    computes: bool = True,
 ) -> argparse.ArgumentParser:
-    """Adds a command and returns its parser; `run` is called with its arguments."""
+    """Adds a command and returns its parser; `run` is called with its arguments.
+
+    Args:
+        commands: of the parser above.
+        name: as it is typed.
+        run: takes the parsed arguments and returns the exit status.
+        summary: for the list of commands.
+        details: for its own help.
+        computes: whether it would run on a GPU, which is then looked for.
+    """
     parser = commands.add_parser(
         name, help=summary, description=details, allow_abbrev=False
     )
-    parser.set_defaults(run=run)
+    parser.set_defaults(run=run, computes=computes)
     return parser
 
 
@@ -178,7 +193,7 @@ def backend_of(args: argparse.Namespace) -> str:
     if name not in BACKENDS:
         raise InputError("--backend", "", name, one_of(BACKENDS, name))
     if name == "warp" and not WARP_INSTALLED:
-        valid = 'what is installed; pip install "fingers-mjx[warp]" for warp'
+        valid = f"what is installed; for warp: {install_command()}"
         raise InputError("--backend", "", name, valid)
     return name
 

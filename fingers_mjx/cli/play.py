@@ -30,6 +30,7 @@ def add(commands) -> None:
         "Close the loop in plain C MuJoCo through the deployment shim. Physics at 200 "
         "Hz, the exported policy at 50 Hz through fingers_deploy; the training "
         "environment takes no part.",
+        computes=False,
     )
     what = "bundle directory or policy.onnx"
     options.path(parser, "bundle", metavar="BUNDLE", help=what)

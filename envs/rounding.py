@@ -1,0 +1,40 @@
+"""Rounding on the CPU that does not depend on how many worlds are stepped."""
+
+import os
+import platform
+from collections.abc import MutableMapping
+from importlib import metadata
+
+from packaging.version import Version
+
+VARIABLE = "XLA_FLAGS"
+WITHOUT_FMA = "--xla_cpu_max_isa=AVX"
+WITHOUT_YNN = "--xla_cpu_experimental_ynn_fusion_type=-reduce"
+_FIRST_YNN = Version("0.11.1")
+"""The first jaxlib of ours that has YNNPACK; others die of a flag they do not know."""
+
+
+def fix_rounding(environment: MutableMapping[str, str] = os.environ) -> None:
+    """Asks XLA for the same bits of a world in a batch of any usual size.
+
+    XLA rounds a·b + c once where it fuses it and twice where it does not, and it sums
+    small arrays in another order than large ones. Which it does depends on how a loop
+    vectorizes, and so on the number of worlds. Here it gets no fused instruction and no
+    library for sums. Vector and scalar code of exp and log still differ, so the number
+    of worlds must be 1, 2, 4 or a multiple of 8. GPU programs are not concerned, nor is
+    any processor but x86, for which XLA cannot be kept from fusing.
+
+    To be called before JAX computes anything. A flag that is set already stays.
+
+    Args:
+        environment: variables of the process.
+    """
+    if platform.machine() not in ("x86_64", "AMD64"):
+        return
+    flags = [WITHOUT_FMA]
+    if Version(metadata.version("jaxlib")) >= _FIRST_YNN:
+        flags.append(WITHOUT_YNN)
+    given = environment.get(VARIABLE, "").split()
+    names = {flag.split("=")[0] for flag in given}
+    new = [flag for flag in flags if flag.split("=")[0] not in names]
+    environment[VARIABLE] = " ".join(given + new)

@@ -1,0 +1,78 @@
+"""Says when an NVIDIA GPU is there and what would use it is not installed."""
+
+import importlib.util
+import logging
+import os
+from collections.abc import Mapping
+from importlib import metadata
+from pathlib import Path
+
+from fingers_mjx.cli.installation import DISTRIBUTION, source_tree
+
+SIGNS = ("dev/nvidia[0-9]*", "usr/lib/wsl/lib/libcuda.so.1")
+"""Files that only a visible NVIDIA GPU has, of Linux and of WSL 2."""
+
+EXTRA = "cuda12"
+"""The extra of which more drivers and GPUs are capable; `cuda13` needs newer ones."""
+
+_CHOICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME")
+_DEVICES = "CUDA_VISIBLE_DEVICES"
+_NONE = ("", "-1", "NoDevFiles")
+
+
+def idle_gpu(
+    backend: str | None = None,
+    environment: Mapping[str, str] = os.environ,
+    root: Path = Path("/"),
+) -> str | None:
+    """Returns one sentence about a GPU that stays idle, with the command; else None.
+
+    Nothing of CUDA is imported and no device is opened. A CUDA JAX that is installed
+    and does not start is reported by JAX itself.
+
+    Args:
+        backend: physics backend that the user asked for, if any.
+        environment: variables of the process, by which the CPU can be chosen.
+        root: of the file system.
+    """
+    if backend == "cpu" or chose_cpu(environment) or not sees_gpu(root):
+        return None
+    if not has_cuda_jax():
+        return (
+            f"an NVIDIA GPU is idle, this JAX knows the CPU only ({install_command()})"
+        )
+    if backend is None and importlib.util.find_spec("warp") is None:
+        return f"physics stays on the CPU, Warp is not installed ({install_command()})"
+    return None
+
+
+def sees_gpu(root: Path = Path("/")) -> bool:
+    """Whether an NVIDIA GPU is visible to this process."""
+    return any(any(root.glob(sign)) for sign in SIGNS)
+
+
+def chose_cpu(environment: Mapping[str, str]) -> bool:
+    """Whether the user's variables keep JAX from the GPU."""
+    if environment.get(_DEVICES, "all") in _NONE:
+        return True
+    asked = [name for key in _CHOICES for name in environment.get(key, "").split(",")]
+    return any(asked) and not {"cuda", "gpu"} & {name.strip() for name in asked}
+
+
+def has_cuda_jax() -> bool:
+    """Whether JAX's plugin for CUDA is installed."""
+    plugins = metadata.entry_points(group="jax_plugins")
+    return any("cuda" in plugin.name for plugin in plugins)
+
+
+def install_command(extra: str = EXTRA) -> str:
+    """Returns what installs an extra of ours, in a checkout or from anywhere."""
+    checkout = source_tree() is not None
+    return f"make {extra}" if checkout else f'pip install "{DISTRIBUTION}[{extra}]"'
+
+
+def quiet_jax() -> None:
+    """Keeps JAX from saying the same once more, without the command."""
+    same = "CUDA-enabled jaxlib is not installed"
+    log = logging.getLogger("jax._src.xla_bridge")
+    log.addFilter(lambda record: same not in record.getMessage())
