@@ -44,6 +44,7 @@ test: sync ## All tests for two CPU cores
 	$(RUN) pytest deploy/tests # alone: some of them run in real time
 
 test-slow: sync ## The large versions of the tests; they print their seeds
+	$(UV) sync --locked --inexact --quiet --extra ray
 	$(RUN) pytest -m slow
 
 test-gpu: sync ## The tests that need an NVIDIA GPU, after make cuda12 or cuda13

@@ -131,3 +131,24 @@ def test_rewards_in_the_reference_are_those_of_the_code(page, table):
     rows = re.findall(r"^\| (`[\w`, ]+`) \| (?:[−\d]|as crawl)", text, re.MULTILINE)
     names = [name for row in rows for name in re.findall(r"\w+", row)]
     assert sorted(names) == sorted(row.name for row in getattr(rewards, table))
+
+
+SWEEPS = re.findall(
+    r"```yaml\n(task:.*?)```",
+    (ROOT / "docs/guides/studies.md").read_text("utf-8"),
+    re.DOTALL,
+)
+
+
+@pytest.mark.parametrize("text", SWEEPS, ids=range(len(SWEEPS)))
+def test_sweeps_in_the_guide_can_begin(tmp_path, text):
+    from envs.config.typed import load_yaml
+    from fingers_mjx.studies.sweep.resolve import keep_sweep
+    from fingers_mjx.studies.sweep.spec import Sweep
+
+    source = tmp_path / "spec.yaml"
+    source.write_text(text, "utf-8")
+    (tmp_path / "sweep").mkdir()
+    spec = load_yaml(Sweep, source)
+    made = keep_sweep(spec, source, tmp_path / "sweep")
+    assert len(SWEEPS) == 3 and made.configurations

@@ -9,6 +9,7 @@ from support.sweep_worker import planned
 from envs.config.typed import from_dict
 from fingers_mjx.studies.sweep.book import Book
 from fingers_mjx.studies.sweep.engine import local
+from fingers_mjx.studies.sweep.ray_cluster import LOOPBACK, ray_cluster
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
 from fingers_mjx.studies.sweep.spec import Sweep
@@ -52,12 +53,31 @@ def plan_faults(root, faults):
     planned(root).write_text(json.dumps(faults), "utf-8")
 
 
-def run_fake(root, **changes):
+def run_fake(root, make=local, **changes):
     """Runs a sweep with pretended trainings and returns its manifest."""
     with sweep_lock(root):
         spec = keep_sweep(sweep(**changes), root / "spec.yaml", root)
         book = Book(spec, root, lambda member: None)
-        return run_sweep(book, local(spec, root, WORKER), lambda event: None)
+        return run_sweep(book, make(spec, root, WORKER), lambda event: None)
+
+
+def run_on_two_nodes(root):
+    """Runs a sweep on a Ray cluster of two nodes on loopback."""
+    from ray.cluster_utils import Cluster
+
+    node = {"num_cpus": 1, "node_ip_address": LOOPBACK, "include_dashboard": False}
+    cluster = Cluster(initialize_head=True, head_node_args=node)
+    cluster.add_node(**node)
+    try:
+        run_fake(root, ray_cluster, engine="ray", address=cluster.address)
+    finally:
+        cluster.shutdown()
+
+
+def summaries(root):
+    """Returns the evaluations of a sweep by member."""
+    found = sorted(root.glob("runs/*/*/*/eval/summary.json"))
+    return {str(p.relative_to(root)): p.read_bytes() for p in found}
 
 
 def states(manifest):
@@ -72,4 +92,5 @@ def journal(root):
 
 
 if __name__ == "__main__":
-    run_fake(Path(sys.argv[1]))
+    run = run_on_two_nodes if "ray" in sys.argv else run_fake
+    run(Path(sys.argv[1]))

@@ -17,6 +17,13 @@ from fingers_mjx.studies.sweep.spec import Sweep
 
 LOST = 1
 """Exit status of a worker whose node is gone."""
+LOOPBACK = "127.0.0.2"
+"""In the place of 127.0.0.1 Ray takes an address that other machines can reach."""
+_OWN = {
+    "_node_ip_address": LOOPBACK,
+    "include_dashboard": False,
+    "object_store_memory": 2**27,
+}
 _QUIET = {
     "RAY_USAGE_STATS_ENABLED": "0",  # nothing is reported to anybody
     "RAY_ENABLE_UV_RUN_RUNTIME_ENV": "0",  # no copy of the tree to the nodes
@@ -93,13 +100,12 @@ def _connected(address: str | None) -> Any:
     except ModuleNotFoundError as error:
         valid = 'local or population, or pip install "fingers-mjx[ray]"'
         raise InputError("sweep", "engine", "ray, not installed", valid) from error
-    own = {"include_dashboard": False, "_node_ip_address": "127.0.0.1"}
     try:
         ray.init(
             address=address or "local",
             log_to_driver=False,
             configure_logging=False,
-            **({} if address else own),
+            **({} if address else _OWN),
         )
     except (ConnectionError, ValueError, RuntimeError) as error:
         valid = "the address of a running Ray cluster"

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 from support import sweep_setup
-from support.sweep_setup import journal, plan_faults, run_fake, states
+from support.sweep_setup import journal, plan_faults, run_fake, states, summaries
 
 from envs.errors import InputError
 from fingers_mjx.runs.directory import locked
@@ -29,12 +29,6 @@ FAULTS = {
     "plain/3": ["input"],
 }
 """T13: what goes wrong with which member, attempt after attempt."""
-
-
-def summaries(root):
-    """Returns the evaluations of a sweep by member."""
-    found = sorted(root.glob("runs/*/*/train/eval/summary.json"))
-    return {str(p.relative_to(root)): p.read_bytes() for p in found}
 
 
 def test_members_that_fail_are_named_and_the_others_finish(tmp_path):
