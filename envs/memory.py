@@ -23,7 +23,8 @@ class PerWorldState:
         weights: reward weights; replace them to sweep rewards without recompiling.
         total_steps: control steps of all episodes, which the curricula follow.
         episodes: episodes begun before this one.
-        footprint: `rewards.FootprintMemory` of tasks that have it, captured once.
+        footprint: `rewards.FootprintMemory` of tasks whose table binds it, captured
+            once.
         task: what else the task keeps of the world, a pytree of its own.
     """
 
@@ -53,7 +54,8 @@ class Memory:
         action: last clipped policy output.
         history: the last eight samples of the observation.
         command: v_x, v_y [m/s] and yaw rate [rad/s] of the coming step.
-        lift: `rewards.LiftMemory` of tasks that have it.
+        lift: `rewards.LiftMemory` of tasks whose table binds it.
+        air_time: `rewards.AirTimeMemory`, likewise.
         task: what else the task carries, a pytree of its own.
     """
 
@@ -65,4 +67,5 @@ class Memory:
     history: Sample
     command: Float[Array, "*b 3"]
     lift: Any = None
+    air_time: Any = None
     task: Any = None

@@ -10,6 +10,7 @@ from jaxtyping import Array, Bool, Float
 from envs.errors import InputError, one_of
 from envs.memory import PerWorldState
 from rewards import (
+    TABLES,
     Constant,
     GeometricDecay,
     RewardTable,
@@ -19,6 +20,22 @@ from rewards import (
     table_weights,
     weights_at,
 )
+
+
+def table_of(task: str, name: str) -> RewardTable:
+    """Returns the reward table of a task that has this name.
+
+    Args:
+        task: a task of `rewards.TABLES`.
+        name: of the table.
+
+    Raises:
+        InputError: the task has no table of that name.
+    """
+    tables = TABLES[task]
+    if name not in tables:
+        raise InputError("configuration", "rewards", name, one_of(tables, name))
+    return tables[name]
 
 
 def check_weights(table: RewardTable, values: Mapping[str, float]) -> None:

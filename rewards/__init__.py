@@ -71,6 +71,7 @@ from rewards.smoothness import action_rate
 from rewards.stance import level_height, palm_tilt, stance_height, stance_pose
 from rewards.tables.crawl import CRAWL, STOCK
 from rewards.tables.keyboard import KEYBOARD
+from rewards.tables.names import TABLES
 from rewards.tables.push import PUSH
 from rewards.tables.recovery import RECOVERY
 from rewards.tracking import track_planar_velocity, track_yaw_rate
@@ -81,6 +82,7 @@ __all__ = [
     "PUSH",
     "RECOVERY",
     "STOCK",
+    "TABLES",
     "AirTimeMemory",
     "AirTimeParams",
     "Constant",

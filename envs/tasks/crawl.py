@@ -1,28 +1,25 @@
 """The crawl task: follow planar velocity and yaw-rate commands on five fingertips."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, PRNGKeyArray, Shaped
 
 from envs.commands import CommandConfig, sample_command
 from envs.errors import InputError
 from envs.memory import Memory, PerWorldState
-from envs.physics import PhysicsState
+from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
-from envs.scoring import check_weights
+from envs.rotations import unrotate
+from envs.scoring import check_weights, table_of
 from envs.signals import Signals
 from envs.streams import stream
 from envs.tasks.gait import Walking
 from envs.tasks.upright import UprightSettings, near_stance
-from rewards import (
-    CRAWL,
-    RewardTable,
-    init_lift_memory,
-    safe_norm,
-)
+from rewards import RewardTable, safe_norm
 
 
 @dataclass(frozen=True)
@@ -30,16 +27,19 @@ class CrawlConfig(UprightSettings):
     """Settings of the crawl task; the others are those of `UprightSettings`.
 
     Attributes:
+        rewards: name of the reward table, see `rewards.TABLES`; "footprint" is the
+            paper's, "stock" the one that the paper compares it with.
         reset_speed_mps: largest base speed at reset, each axis (ours).
         command: ranges of the commands.
     """
 
+    rewards: str = "footprint"
     reset_speed_mps: float = field(default=0.05, metadata={"unit": "m/s", "low": 0.0})
     command: CommandConfig = field(default_factory=CommandConfig)
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_weights(CRAWL, self.weights)
+        check_weights(table_of("crawl", self.rewards), self.weights)
         if self.command.resample_s < self.control_dt_s:
             found, valid = self.command.resample_s, f">= {self.control_dt_s:g} s"
             raise InputError("configuration", "command.resample_s", found, valid)
@@ -51,20 +51,23 @@ class Crawl(Walking):
 
     Attributes:
         config: settings of the task.
-        table: rows of the reward; they may bind every signal and the magnitudes of
-            `magnitudes`.
+        table: rows of the reward that the settings name; they may bind every signal,
+            those of `scene_signals` and the magnitudes of `magnitudes`.
     """
 
     config: CrawlConfig
-    table: RewardTable = CRAWL
+    table: RewardTable = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "table", table_of("crawl", self.config.rewards))
 
     def begin_episode(
         self, key: PRNGKeyArray, world: PerWorldState, state: PhysicsState
     ) -> dict[str, Any]:
-        """A first command and a fresh lift memory."""
+        """A first command and fresh memories of the gait."""
         del world, state
         command = sample_command(key, self.config.command)
-        return {"command": command, "lift": init_lift_memory()}
+        return {"command": command} | self.begin_gait()
 
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
@@ -83,20 +86,39 @@ class Crawl(Walking):
         return state, jnp.array(plant.stance.target_rad)
 
     def advance(self, memory: Memory, signals: Signals) -> Memory:
-        """Draws the next command when its time has come, and resets the lift memory."""
+        """Draws the next command when its time has come, and what follows it anew."""
         del signals
         config = self.config
         period = round(config.command.resample_s / config.control_dt_s)
         due = memory.steps % period == 0
         world = memory.world
         key = jax.random.fold_in(stream(world.key, "resample"), world.total_steps)
-        fresh = (sample_command(key, config.command), init_lift_memory())
-        command, lift = jax.tree.map(
-            lambda new, old: jnp.where(due, new, old),
-            fresh,
-            (memory.command, memory.lift),
-        )
-        return memory.replace(command=command, lift=lift)
+        fresh = {
+            "command": sample_command(key, config.command)
+        } | self.begin_with_command()
+        old = {name: getattr(memory, name) for name in fresh}
+        kept = jax.tree.map(lambda new, old: jnp.where(due, new, old), fresh, old)
+        return memory.replace(**kept)
+
+    def scene_signals(
+        self,
+        plant: Plant,
+        carried: Mapping[str, Any],
+        signals: Signals,
+        output: PhysicsOutput,
+    ) -> dict[str, Shaped[Array, "..."]]:
+        """Gravity in V, g_V = q_off* ⊗ g_b ⊗ q_off, where the table binds it.
+
+        Returns:
+            `gravity_v` [1], or nothing.
+
+        Source:
+            Paper, design of the ablation.
+        """
+        del carried, output
+        if not self.binds("gravity_v"):
+            return {}
+        return {"gravity_v": unrotate(jnp.array(plant.stance.q_off), signals.gravity_b)}
 
     def measures(self, signals: Signals) -> dict[str, Float[Array, ""]]:
         """Speed of the palm along the commanded direction, v_xy · v_cmd/‖v_cmd‖.

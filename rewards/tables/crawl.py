@@ -1,9 +1,9 @@
 """Reward tables of the crawl task: the paper's, and the stock one it compares with.
 
 The signals that the rows bind are attributes of `envs.signals.Signals`, and four extras
-that the caller adds: `footprint_target_v` (from `footprint_step`), `lift_magnitude`
-(from `lift_step`), `air_time_magnitude` (from `air_time_step`) and `gravity_v`, the
-unit vector of gravity in V.
+that the caller adds (`envs.tasks.gait`): `footprint_target_v` (from `footprint_step`),
+`lift_magnitude` (from `lift_step`), `air_time_magnitude` (from `air_time_step`) and
+`gravity_v`, the unit vector of gravity in V.
 """
 
 from rewards.compose import RewardTable, RewardTerm, precomputed

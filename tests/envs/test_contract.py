@@ -1,4 +1,7 @@
-"""What every registered task keeps to; a new task is tested by being registered."""
+"""What every registered task keeps to, and every reward table that it can be paid by.
+
+A new task is tested by being registered, a new table by being in `rewards.TABLES`.
+"""
 
 import jax
 import jax.numpy as jnp
@@ -6,13 +9,29 @@ import numpy as np
 import pytest
 
 from envs.registry import task_names
+from rewards import TABLES
 
 INFO = {"truncation", "invalid", "episode_return", "episode_length"}
 
 
-@pytest.fixture(scope="module", params=task_names())
-def task(request, make_compiled):
-    return make_compiled(request.param)
+TASKS = [(name, None) for name in task_names()]
+OTHERS = [(task, name) for task, tables in TABLES.items() for name in [*tables][1:]]
+"""Tables other than a task's default."""
+
+
+@pytest.fixture(
+    scope="module", params=TASKS + OTHERS, ids=lambda p: "-".join(filter(None, p))
+)
+def make(request, make_compiled):
+    """Makes the task with so many worlds."""
+    name, table = request.param
+    changes = {"rewards": table} if table else {}
+    return lambda *worlds: make_compiled(name, *worlds, **changes)
+
+
+@pytest.fixture(scope="module")
+def task(make):
+    return make()
 
 
 @pytest.fixture(scope="module")
@@ -231,9 +250,8 @@ def test_no_call_after_the_first_compiles_anything(task, rollout):
     assert events != []
 
 
-def test_a_world_does_not_depend_on_how_many_are_stepped(task, rollout, make_compiled):
-    name = next(n for n in task_names() if make_compiled(n) is task)
-    two = make_compiled(name, 2)
+def test_a_world_does_not_depend_on_how_many_are_stepped(task, rollout, make):
+    two = make(2)
     actions = task.actions(25, scale=0.5)
     few, many = two.first, task.first
     for action in actions:

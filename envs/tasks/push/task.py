@@ -36,7 +36,6 @@ from envs.tasks.upright import fallen, near_stance
 from rewards import (
     PUSH,
     RewardTable,
-    init_lift_memory,
     object_delivered,
     safe_norm,
 )
@@ -143,7 +142,7 @@ class Push(Walking):
         track = start_track(read_camera(camera))
         task = PushMemory(target_w, distance, distance, camera, track)
         command = guidance(qpos, target_w, self._q_off)
-        return {"command": command, "lift": init_lift_memory(), "task": task}
+        return {"command": command, "task": task} | self.begin_gait()
 
     def inputs(
         self, carried: Mapping[str, Any], sample: Sample

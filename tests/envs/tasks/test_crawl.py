@@ -200,6 +200,8 @@ def _product(a, b):
         ("randomize.imu_tilt_rad=.nan", "randomize.imu_tilt_rad"),
         ("episode_s=0", "episode_s"),
         ("acton_clip=1", "acton_clip"),
+        ("rewards=stok", "rewards"),
+        ("weights.feet_air_time=2", "weights.feet_air_time"),
     ],
 )
 def test_bad_settings_are_named(assignment, field):

@@ -1,0 +1,16 @@
+"""Which tables there are; `tests/envs/test_contract.py` steps all of them."""
+
+import rewards
+from envs.registry import task_names
+
+
+def test_the_papers_crawl_reward_is_the_default_and_stock_the_other():
+    assert [*rewards.TABLES["crawl"].items()] == [
+        ("footprint", rewards.CRAWL),
+        ("stock", rewards.STOCK),
+    ]
+
+
+def test_tables_are_those_of_tasks_that_have_a_choice():
+    assert set(rewards.TABLES) <= set(task_names())
+    assert all(len(tables) > 1 for tables in rewards.TABLES.values())
