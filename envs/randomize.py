@@ -1,8 +1,9 @@
 """Domain randomization: what differs from world to world, and how it enters the model.
 
 A draw holds for a world through all its episodes. The ranges of friction, gains, effort
-and payload are the paper's; those of palm, IMU and noise are ours, the paper naming the
-quantity only.
+and payload's place are the paper's; those of palm, IMU and noise are ours, the paper
+naming the quantity only. The payload's mass is fixed, unless a stage of training is to
+be without it.
 """
 
 from dataclasses import dataclass, field
@@ -12,6 +13,7 @@ import flax.struct
 import jax
 import jax.numpy as jnp
 import mujoco
+import numpy as np
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.errors import check_ordered
@@ -30,6 +32,8 @@ class RandomizeConfig:
         effort_scale: factor on all torque limits.
         payload_com_m: largest offset of the payload's centre of mass along the back
             (both directions) and away from it.
+        payload_mass_scale: factor on the payload's mass and inertia; nearly nothing for
+            a first stage without the dorsal module (ours).
         palm_mass_scale: factor on the palm's mass and inertia (ours).
         palm_com_m: largest offset of the palm's centre of mass, each axis (ours).
         imu_tilt_rad: largest mounting error of the IMU about each axis (ours).
@@ -50,6 +54,9 @@ class RandomizeConfig:
     payload_com_m: tuple[float, float] = field(
         default=(0.010, 0.015), metadata={"unit": "m", "low": 0.0}
     )
+    payload_mass_scale: tuple[float, float] = field(
+        default=(1.0, 1.0), metadata={"unit": "1", "low": 1e-3}
+    )
     palm_mass_scale: tuple[float, float] = field(
         default=(0.9, 1.1), metadata={"unit": "1", "low": 0.01}
     )
@@ -61,15 +68,15 @@ class RandomizeConfig:
     gyro_noise_rps: float = field(default=0.05, metadata={"unit": "rad/s", "low": 0.0})
 
     def __post_init__(self) -> None:
-        ranges = ("tip_friction", "gain_scale", "effort_scale", "palm_mass_scale")
-        check_ordered(self, *ranges)
+        masses = ("payload_mass_scale", "palm_mass_scale")
+        check_ordered(self, "tip_friction", "gain_scale", "effort_scale", *masses)
 
 
 def no_randomization(tip_friction: float) -> RandomizeConfig:
     """The nominal hand: every range is a point and every noise zero."""
     one = (1.0, 1.0)
     return RandomizeConfig(
-        (tip_friction, tip_friction), one, one, (0.0, 0.0), one, *([0.0] * 6)
+        (tip_friction, tip_friction), one, one, (0.0, 0.0), one, one, *([0.0] * 6)
     )
 
 
@@ -82,6 +89,7 @@ class Variation:
     damping_scale: Float[Array, "*b 20"]
     effort_scale: Float[Array, "*b"]
     payload_com_m: Float[Array, "*b 3"]
+    payload_mass_scale: Float[Array, "*b"]
     palm_mass_scale: Float[Array, "*b"]
     palm_com_m: Float[Array, "*b 3"]
     imu_rotation_rad: Float[Array, "*b 3"]
@@ -118,6 +126,7 @@ def draw_variation(key: PRNGKeyArray, config: RandomizeConfig) -> Variation:
         effort_scale=uniform("effort_scale", (), *config.effort_scale),
         # The palm's x is normal to its back.
         payload_com_m=within("payload_com", [away, along, along]),
+        payload_mass_scale=uniform("payload_mass", (), *config.payload_mass_scale),
         palm_mass_scale=uniform("palm_mass", (), *config.palm_mass_scale),
         palm_com_m=within("palm_com", config.palm_com_m),
         imu_rotation_rad=within("imu_tilt", config.imu_tilt_rad),
@@ -130,12 +139,13 @@ def model_fields(
 ) -> ModelFields:
     """The model fields of a varied world, all that changes and nothing else.
 
-    Subtree masses follow the palm's mass. The inverse weights that scale the softness
-    of constraints stay the nominal ones, on every backend.
+    Subtree masses follow those of palm and payload. The inverse weights that scale the
+    softness of constraints stay the nominal ones, on every backend.
     """
     palm, payload = spec.palm_body, spec.payload_body
-    scale = variation.palm_mass_scale
-    added = (scale - 1.0) * model.body_mass[palm]
+    bodies = np.array([palm, payload])
+    scale = jnp.stack([variation.palm_mass_scale, variation.payload_mass_scale])
+    added = (scale - 1.0) * model.body_mass[bodies]
     gain = jnp.asarray(model.actuator_gainprm)
     bias = jnp.asarray(model.actuator_biasprm)
     tips = jnp.array(spec.tip_geoms)
@@ -150,8 +160,10 @@ def model_fields(
         .multiply(variation.damping_scale),
         "actuator_forcerange": jnp.asarray(model.actuator_forcerange)
         * variation.effort_scale,
-        "body_mass": jnp.asarray(model.body_mass).at[palm].multiply(scale),
-        "body_inertia": jnp.asarray(model.body_inertia).at[palm].multiply(scale),
+        "body_mass": jnp.asarray(model.body_mass).at[bodies].multiply(scale),
+        "body_inertia": jnp.asarray(model.body_inertia)
+        .at[bodies]
+        .multiply(scale[:, None]),
         "body_ipos": jnp.asarray(model.body_ipos)
         .at[palm]
         .add(variation.palm_com_m)
@@ -159,5 +171,7 @@ def model_fields(
         .add(variation.payload_com_m),
         "body_subtreemass": jnp.asarray(model.body_subtreemass)
         .at[jnp.array([0, palm])]
-        .add(added),
+        .add(added[0] + added[1])
+        .at[payload]
+        .add(added[1]),
     }

@@ -7,6 +7,7 @@ import shlex
 from pathlib import Path
 
 import pytest
+import yaml
 
 from fingers_mjx.cli.main import UsageError, make_parser
 
@@ -113,6 +114,52 @@ def test_presets_in_the_training_guide_are_those_of_the_code():
     assert said == {
         name: (f"{m.num_envs:,}", f"{m.iterations:,}") for name, m in made.items()
     }
+
+
+PAPER = (ROOT / "docs/reference/paper.md").read_text("utf-8").split("\n## ")
+NOT_THE_PAPERS = {"env.weights", "env.contacts_per_world", "env.constraints_per_world"}
+"""Settings of which the page of the paper's values does not speak."""
+
+
+def beside_the_paper(task):
+    """Rows (setting, paper, ours, why) of the page, and our settings by dotted name."""
+    from envs.config.typed import to_dict
+    from fingers_mjx.ppo.config import preset
+    from fingers_mjx.runs.setup import new_setup
+
+    texts = [text for text in PAPER if f"`{task}`" in text.partition("\n")[0]]
+    rows = re.findall(
+        r"^\| `([\w.]+)` \| ([^|]+) \| ([^|]+) \| ?([^|]*)\|$",
+        "\n".join(texts),
+        re.MULTILINE,
+    )
+    setup = new_setup(preset("paper", task), None)
+    return rows, flat(to_dict(setup.train) | {"env": to_dict(setup.env)})
+
+
+def flat(tree, prefix=""):
+    if not isinstance(tree, dict) or prefix == "env.weights.":
+        return {prefix.rstrip("."): tree}
+    leaves = [flat(x, f"{prefix}{name}.") for name, x in tree.items()]
+    return {k: v for inner in leaves for k, v in inner.items()}
+
+
+@pytest.mark.parametrize("task", ["crawl", "recovery", "keyboard", "push"])
+def test_values_beside_the_papers_are_those_of_the_code(task):
+    rows, ours = beside_the_paper(task)
+    assert len(rows) >= 3
+    said = {name: yaml.safe_load(value) for name, _, value, _ in rows}
+    # YAML 1.1 reads 1e-3 as text.
+    said = {k: float(v) if isinstance(ours[k], float) else v for k, v in said.items()}
+    assert said == {name: ours[name] for name in said}
+    # Where the paper states a value, ours is that value.
+    assert [(name, a, b) for name, a, b, _ in rows if a not in ("–", b)] == []
+
+
+def test_every_setting_stands_beside_the_papers():
+    rows, ours = beside_the_paper("crawl")
+    wanted = {name for name in ours if name.startswith(("ppo.", "env."))}
+    assert wanted - {row[0] for row in rows} == NOT_THE_PAPERS
 
 
 @pytest.mark.parametrize(

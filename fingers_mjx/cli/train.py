@@ -32,7 +32,8 @@ def add(commands) -> None:
     parser.add_argument(
         "--preset",
         metavar="NAME",
-        help="paper (its settings), fast (one GPU) or cpu (small); default: by machine",
+        help="paper (its settings), adapt (its second stage, with --warm-start), fast "
+        "(one GPU) or cpu (small); default: by machine",
     )
     what = "a setting such as ppo.entropy_cost=0.001 or env.action_clip=0.8"
     options.settings(parser, what)
@@ -94,6 +95,9 @@ def _new(args: argparse.Namespace) -> Setup:
     if args.task is None:
         raise InputError("TASK", "", "", one_of(task_names()))
     get_task(args.task)
+    if args.preset == "adapt" and args.warm_start is None:
+        valid = "with --warm-start RUN, a first stage"
+        raise InputError("--preset", "", args.preset, valid)
     setup = new_setup(options.train_config(args, args.seed), args.hand)
     return overridden(setup, args.settings)
 

@@ -21,14 +21,14 @@ MODEL = build_model(HAND)
 SPEC = hand_spec(MODEL)
 KEY = jax.random.key(20260111)
 NOMINAL = draw_variation(KEY, no_randomization(HAND.tip_friction.value))
-ROOM = {"stiffness_scale.low=null", "stiffness_scale.high=null"}
+LOADED = {"payload_mass_scale": (0.5, 1.0)}
 
 
 @pytest.fixture(scope="module")
 def draws():
     print("seed 20260111")
-    keys = jax.random.split(KEY, 4000)
-    return jax.vmap(lambda key: draw_variation(key, RandomizeConfig()))(keys)
+    keys, config = jax.random.split(KEY, 4000), RandomizeConfig(**LOADED)
+    return jax.vmap(lambda key: draw_variation(key, config))(keys)
 
 
 @pytest.mark.parametrize(
@@ -39,6 +39,7 @@ def draws():
         ("damping_scale", 0.78, 1.22),
         ("effort_scale", 1.0, 1.5),
         ("payload_com_m", [-0.015, -0.010, -0.010], [0.015, 0.010, 0.010]),
+        ("payload_mass_scale", 0.5, 1.0),
         ("palm_mass_scale", 0.9, 1.1),
         ("palm_com_m", -0.005, 0.005),
         ("imu_rotation_rad", -0.03, 0.03),
@@ -68,6 +69,7 @@ WIDER = {
     "tip_friction": {"tip_friction": (0.1, 2.0)},
     "effort_scale": {"effort_scale": (0.5, 2.0)},
     "payload_com_m": {"payload_com_m": (0.02, 0.03)},
+    "payload_mass_scale": LOADED,
     "palm_mass_scale": {"palm_mass_scale": (0.5, 2.0)},
     "palm_com_m": {"palm_com_m": 0.01},
     "imu_rotation_rad": {"imu_tilt_rad": 0.1},
@@ -96,6 +98,7 @@ RANGES = np.linspace(0.8, 1.2, 20)
     ("changes", "assignments"),
     [
         ({"tip_friction": 0.35}, ["tip_friction.low=null", "tip_friction.value=0.35"]),
+        ({"payload_mass_scale": 0.25}, ["payload_mass.value=0.02"]),
         ({"palm_mass_scale": 1.1}, [f"palm_mass.value={1.1 * HAND.palm_mass.value}"]),
         (
             {"palm_com_m": [0.001, -0.002, 0.003]},

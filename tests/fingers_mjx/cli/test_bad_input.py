@@ -57,6 +57,13 @@ SETTINGS = [
     (["train"], ["TASK", "crawl"]),
     (["train", "crawll"], ["crawll", "crawl"]),
     (["train", "crawl", "--preset", "fats"], ["preset", "fats", "did you mean fast"]),
+    (["train", "crawl", "--preset", "adapt"], ["--preset", "adapt", "--warm-start"]),
+    (["train", "crawl", "--set", "env.rewards=stok"], ["stok", "did you mean stock"]),
+    (
+        ["train", "crawl", "--set", "env.rewards=stock", "env.weights.lift=1"],
+        ["env.weights.lift", "feet_air_time"],
+    ),
+    (["train", "push", "--set", "env.rewards=stock"], ["env.rewards", "weights"]),
     (["train", "crawl", "--backend", "gpu"], ["--backend", "gpu", "cpu, jax, warp"]),
     (["train", "crawl", "--seed", "-1"], ["--seed", "-1", "whole number"]),
     (["train", "crawl", "--seed", "many"], ["--seed", "many", "whole number"]),

@@ -53,10 +53,10 @@ def test_the_nominal_hand_has_neither_spread_nor_noise():
     env = nominal(make_setup()).env
     ranges = vars(env.randomize)
     assert ranges["tip_friction"] == (0.88, 0.88)
-    for name in ("gain_scale", "effort_scale", "palm_mass_scale"):
-        assert ranges[name] == (1.0, 1.0)
-    rest = set(ranges) - {"tip_friction", "gain_scale", "effort_scale"}
-    zero = [ranges[name] for name in sorted(rest - {"palm_mass_scale"})]
+    scales = {name for name in ranges if name.endswith("_scale")}
+    assert scales > {"gain_scale", "payload_mass_scale"}
+    assert {ranges[name] for name in scales} == {(1.0, 1.0)}
+    zero = [ranges[name] for name in sorted(set(ranges) - scales - {"tip_friction"})]
     assert all(np.all(np.array(value) == 0.0) for value in zero), ranges
     assert (env.reset_joint_rad, env.reset_speed_mps) == (0.0, 0.0)
 

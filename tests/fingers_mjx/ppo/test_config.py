@@ -8,6 +8,7 @@ from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
 from fingers_mjx.ppo.config import (
     PRESETS,
+    STAGES,
     TrainConfig,
     bound_fields,
     check_config,
@@ -37,6 +38,24 @@ def test_paper_preset_is_the_paper():
     assert (ppo.discount, ppo.gae_lambda, ppo.entropy_cost) == (0.99, 0.95, 0.005)
     assert ppo.actor_layers == (512, 256, 128)
     assert config.steps_per_iteration * config.iterations == 786_432_000
+
+
+def test_the_second_stage_is_the_first_but_for_length_and_noise():
+    first, second = paper(), preset("adapt")
+    assert second.iterations == 5000
+    assert second.ppo.init_noise_std < first.ppo.init_noise_std
+    same = {"preset": "paper", "iterations": 8000, "ppo": first.ppo}
+    noise = dataclasses.replace(first.ppo, init_noise_std=second.ppo.init_noise_std)
+    assert second.ppo == noise
+    assert dataclasses.replace(second, **same) == first
+
+
+@pytest.mark.parametrize("task", ["crawl", "recovery", "keyboard", "push"])
+@pytest.mark.parametrize("name", PRESETS)
+def test_manipulation_has_the_papers_critic_in_its_presets_only(name, task):
+    layers, crawl = (preset(name, t).ppo.critic_layers for t in (task, "crawl"))
+    papers = name in STAGES and task in ("keyboard", "push")
+    assert layers == ((256, 128, 64) if papers else crawl)
 
 
 @pytest.mark.parametrize("name", PRESETS)

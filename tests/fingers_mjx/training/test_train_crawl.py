@@ -98,15 +98,6 @@ def test_resumed_crawl_is_bit_equal_to_a_straight_one(env, straight, tmp_path):
     assert not set(footprints) & set(moved)  # captured once, kept over resets
 
 
-def test_schedules_go_on_in_the_next_stage(env, straight, tmp_path):
-    how = {"warm_start": straight, "keep_schedules": True}
-    run(tmp_path / "next", env, setup(), iterations=2, **how)
-    iteration, arrays = leaves(tmp_path / "next")
-    assert iteration == arrays["train/iteration"] == 2
-    steps = arrays["worlds/memory/world/total_steps"]
-    np.testing.assert_array_equal(steps, (ITERATIONS + 2) * TRAIN.ppo.unroll_length)
-
-
 @pytest.mark.parametrize(
     ("changes", "field"),
     [
