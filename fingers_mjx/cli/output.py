@@ -1,6 +1,6 @@
 """What commands print and keep of an evaluation."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +9,7 @@ from rich.table import Table
 
 from fingers_mjx.evaluation.files import write_summary
 
-WIDTH = 120
+WIDTH = 160
 """Room for whole names and numbers; a narrower terminal breaks the lines itself."""
 
 
@@ -23,17 +23,27 @@ def keep_summary(path: Path | None, summary: Mapping[str, Any]) -> None:
 def print_measures(summary: Mapping[str, Any]) -> None:
     """Prints the measures of a summary with their 95 % intervals and percentiles."""
     title = f"{summary['policy']}: {summary['episodes']} episodes of {summary['task']}"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column("measure")
-    for name in ("mean", "95 % interval", "std", "median", "95th %", "n"):
-        table.add_column(name, justify="right")
+    header = ("measure", "mean", "95 % interval", "std", "median", "95th %", "n")
+    rows = []
     for name, measure in summary["measures"].items():
         ends = (_text(measure["low"]), _text(measure["high"]))
         interval = "–" if measure["low"] is None else f"{ends[0]} – {ends[1]}"
         spread = (_text(measure[key]) for key in ("std", "median", "p95"))
-        table.add_row(
-            name, _text(measure["mean"]), interval, *spread, str(measure["n"])
+        rows.append(
+            (name, _text(measure["mean"]), interval, *spread, str(measure["n"]))
         )
+    print_table(title, header, rows)
+
+
+def print_table(
+    title: str, header: Sequence[str], rows: Sequence[Sequence[str]], names: int = 1
+) -> None:
+    """Prints rows of text; all columns but the first `names` are set to the right."""
+    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
+    for index, name in enumerate(header):
+        table.add_column(name, justify="left" if index < names else "right")
+    for row in rows:
+        table.add_row(*row)
     Console(soft_wrap=True, highlight=False, width=WIDTH).print(table)
 
 

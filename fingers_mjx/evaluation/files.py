@@ -1,9 +1,10 @@
 """Files of an evaluation: per-episode Parquet table and JSON summary, each atomic."""
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -29,7 +30,22 @@ def write_table(
         about: text stored beside the columns (task, policy, seed, ...).
     """
     rows = {"episode": np.arange(len(next(iter(columns.values())))), **columns}
-    table = pa.table({name: pa.array(values) for name, values in rows.items()})
+    return write_columns(path, rows, about)
+
+
+def write_columns(
+    path: Path,
+    columns: Mapping[str, np.ndarray | Sequence[Any]],
+    about: Mapping[str, str] | None = None,
+) -> Path:
+    """Writes columns as Parquet.
+
+    Args:
+        path: file to write.
+        columns: name to values, equally many; None is null.
+        about: text stored beside the columns.
+    """
+    table = pa.table({name: pa.array(values) for name, values in columns.items()})
     table = table.replace_schema_metadata(dict(about or {}))
     memory = pa.BufferOutputStream()
     pq.write_table(table, memory, compression="zstd")

@@ -42,7 +42,7 @@ def gait_diagram(
         dt_s: control interval.
         title: of the figure.
     """
-    figure, (axes,) = _figure(1, (7.6, 2.3))
+    figure, (axes,) = panels_of(1, (7.6, 2.3))
     for tip, (name, colour) in enumerate(zip(FINGERS, FINGER_COLOURS, strict=True)):
         edges = np.flatnonzero(np.diff(contact[:, tip], prepend=False, append=False))
         bars = [((a * dt_s), (b - a) * dt_s) for a, b in edges.reshape(-1, 2)]
@@ -68,7 +68,7 @@ def foot_trajectories(
         tip_pos_v: fingertips relative to the palm in V [m].
         contact: which tips touch, per control step.
     """
-    figure, (side, top) = _figure(2, (7.6, 3.4))
+    figure, (side, top) = panels_of(2, (7.6, 3.4))
     for tip, (name, colour) in enumerate(zip(FINGERS, FINGER_COLOURS, strict=True)):
         path = 1000 * tip_pos_v[:, tip]
         stance = np.where(contact[:, tip, None], path, np.nan)
@@ -92,7 +92,7 @@ def tracking(columns: Mapping[str, Float[np.ndarray, " episodes"]]) -> Figure:
         columns: of an episode table; read are command_speed_mps, task_speed_mps,
             command_turn_rate_rad_s and turn_rate_rad_s.
     """
-    figure, (speed, turn) = _figure(2, (7.6, 3.4))
+    figure, (speed, turn) = panels_of(2, (7.6, 3.4))
     speeds = columns["command_speed_mps"], columns["task_speed_mps"]
     turns = columns["command_turn_rate_rad_s"], columns["turn_rate_rad_s"]
     _against(speed, *speeds, LINES[0])
@@ -121,7 +121,7 @@ def tracking_in_time(
         dt_s: control interval.
         title: of the figure.
     """
-    figure, rows = _figure(3, (7.6, 4.6), rows=3)
+    figure, rows = panels_of(3, (7.6, 4.6), rows=3)
     achieved = np.column_stack([vel_v, yaw_rate])
     time = dt_s * (1 + np.arange(len(command)))
     names = ("forward [m/s]", "left [m/s]", "turn [rad/s]")
@@ -153,7 +153,7 @@ def training_curves(
         metrics: key in the rows to label with unit, in the order of panels.
         x: key of the horizontal axis, which counts environment steps.
     """
-    figure, panels = _figure(len(metrics), (3.8 * len(metrics), 3.0))
+    figure, panels = panels_of(len(metrics), (3.8 * len(metrics), 3.0))
     for axes, (key, label) in zip(panels, metrics.items(), strict=True):
         for (name, rows), colour in zip(runs.items(), _cycle(len(runs)), strict=True):
             points = [(row[x], row[key]) for row in rows if key in row and x in row]
@@ -173,7 +173,7 @@ def standing(
         failed: name of a policy to whether each episode failed in each step.
         dt_s: control interval.
     """
-    figure, (axes,) = _figure(1, (7.6, 2.8))
+    figure, (axes,) = panels_of(1, (7.6, 2.8))
     for (name, fell), colour in zip(failed.items(), _cycle(len(failed)), strict=True):
         share = 1.0 - np.maximum.accumulate(fell, axis=0).mean(axis=1)
         time = dt_s * (1 + np.arange(len(share)))
@@ -184,13 +184,21 @@ def standing(
     return figure
 
 
-def _figure(
-    count: int, size: tuple[float, float], rows: int = 1
+def panels_of(
+    count: int, size: tuple[float, float], rows: int = 1, shared: bool = True
 ) -> tuple[Figure, list[Axes]]:
-    """Returns an Agg figure of its own: no pyplot state, nothing to close."""
+    """Returns an Agg figure of its own: no pyplot state, nothing to close.
+
+    Args:
+        count: of panels, a multiple of `rows`.
+        size: width and height [inch].
+        rows: of panels.
+        shared: whether panels of several rows have one horizontal axis.
+    """
+    sharex = shared and rows > 1
     with mpl.rc_context(STYLE):
         figure = Figure(figsize=size, layout="constrained")
-        panels = figure.subplots(rows, count // rows, squeeze=False, sharex=rows > 1)
+        panels = figure.subplots(rows, count // rows, squeeze=False, sharex=sharex)
     return figure, list(panels.flat)
 
 

@@ -2,11 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 
+from fingers_mjx.evaluation.direction import Better
 from fingers_mjx.studies.statistics.improvement import probability_of_improvement
 from fingers_mjx.studies.statistics.intervals import (
     bca_interval,
@@ -16,8 +16,6 @@ from fingers_mjx.studies.statistics.intervals import (
 from fingers_mjx.studies.statistics.pairs import Pairs
 from fingers_mjx.studies.statistics.power import detectable
 from fingers_mjx.studies.statistics.significance import paired_p
-
-Better = Literal["higher", "lower"]
 
 ONE_SEED = "one seed per arm proves nothing"
 ROUNDING = 1e-12
