@@ -16,7 +16,7 @@ from typing import NoReturn
 from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
 from fingers_mjx.cli.installation import check_installation, check_places
 
-COMMANDS = ("train", "evaluate", "sweep", "export", "play", "hand")
+COMMANDS = ("train", "evaluate", "sweep", "compare", "export", "play", "hand")
 SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 

@@ -12,6 +12,9 @@ Better = Literal["higher", "lower"]
 _STANDING: dict[str, Better] = {"survival": "higher", "undesired_contact_rate": "lower"}
 """Of every task that begins and should stay on the fingertips, also a user's own."""
 
+_SIDES = ("", "_thumb", "_wrist")
+"""Over all falls, and by the side of the fall."""
+
 BETTER: Mapping[str, Mapping[str, Better]] = {
     "crawl": {
         "task_speed_mps": "higher",
@@ -50,13 +53,9 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         **_STANDING,
     },
     "recovery": {
-        f"{measure}{side}": better
-        for side in ("", "_thumb", "_wrist")
-        for measure, better in (
-            ("righted", "higher"),
-            ("time_to_upright_s", "lower"),
-            ("final_joint_error_rad", "lower"),
-        )
+        **{f"righted{side}": "higher" for side in _SIDES},
+        **{f"time_to_upright_s{side}": "lower" for side in _SIDES},
+        **{f"final_joint_error_rad{side}": "lower" for side in _SIDES},
     },
 }
 

@@ -1,0 +1,1 @@
+"""Comparison of configurations over seeds: what a sweep shows, and what it lacks."""

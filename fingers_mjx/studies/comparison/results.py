@@ -1,0 +1,144 @@
+"""What a sweep has measured: one value for each member and measure, and what lacks."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path, PurePath
+from typing import Any
+
+from envs.errors import InputError
+from fingers_mjx.evaluation.files import SUMMARY_FILE
+from fingers_mjx.studies.sweep.manifest import Manifest, Member
+
+ALIKE = ("task", "episodes", "seed", "conditions")
+"""What evaluations must share to be compared."""
+
+
+@dataclass(frozen=True)
+class Missing:
+    """A member without a measurement.
+
+    Attributes:
+        configuration: by name.
+        seed: of its training.
+        reason: what became of it.
+    """
+
+    configuration: str
+    seed: int
+    reason: str
+
+    @property
+    def name(self) -> str:
+        """Configuration and seed."""
+        return f"{self.configuration}/{self.seed}"
+
+
+@dataclass(frozen=True)
+class Results:
+    """What the members of a sweep measured.
+
+    Attributes:
+        task: that all members learn.
+        configurations: names, in the order of the specification.
+        values: configuration, measure and seed to the mean over the member's episodes;
+            NaN where no episode defines it.
+        steps: configuration and seed to the control steps behind the policy.
+        missing: members without an evaluation.
+        conditions: what all evaluations share.
+    """
+
+    task: str
+    configurations: tuple[str, ...]
+    values: Mapping[str, Mapping[str, Mapping[int, float]]]
+    steps: Mapping[str, Mapping[int, int]]
+    missing: tuple[Missing, ...]
+    conditions: Mapping[str, Any]
+
+    @property
+    def members(self) -> int:
+        """How many members the sweep has."""
+        return len(self.missing) + sum(map(len, self.steps.values()))
+
+    @property
+    def measures(self) -> list[str]:
+        """Names of the measures that any member defines, sorted."""
+        return sorted(
+            {
+                measure
+                for of in self.values.values()
+                for measure, seeds in of.items()
+                if any(map(math.isfinite, seeds.values()))
+            }
+        )
+
+
+def read_results(root: Path, manifest: Manifest) -> Results:
+    """Reads the evaluations of all members that are done.
+
+    Args:
+        root: directory of the sweep.
+        manifest: its members.
+
+    Raises:
+        InputError: a name that is no name of a directory, or evaluations that were made
+            in different ways, such as with other numbers of episodes.
+    """
+    for name in (*manifest.configurations, *manifest.stages):
+        if PurePath(name).name != name:
+            raise InputError(root, "name", name, "the name of a directory")
+    values: dict[str, dict[str, dict[int, float]]] = {}
+    steps: dict[str, dict[int, int]] = {}
+    missing, first = [], None
+    for member in manifest.members:
+        found = _summary(root, manifest, member)
+        if isinstance(found, str):
+            missing.append(Missing(member.configuration, member.seed, found))
+            continue
+        first = first or (member, found)
+        _check_alike(root, first, (member, found))
+        own = values.setdefault(member.configuration, {})
+        for measure, value in found["measures"].items():
+            mean = value["mean"]
+            own.setdefault(measure, {})[member.seed] = (
+                math.nan if mean is None else mean
+            )
+        trained = steps.setdefault(member.configuration, {})
+        trained[member.seed] = found["steps_trained"]
+    shared = {key: first[1][key] for key in ALIKE} if first else {}
+    return Results(
+        task=manifest.task,
+        configurations=manifest.configurations,
+        values=values,
+        steps=steps,
+        missing=tuple(missing),
+        conditions=shared,
+    )
+
+
+def _summary(root: Path, manifest: Manifest, member: Member) -> dict[str, Any] | str:
+    """Returns the evaluation of a member, or the reason why there is none."""
+    if member.state != "done":
+        where = f"in {member.stage} after {member.iterations} iterations"
+        return f"{member.state} {where}" + (f": {member.reason}" * bool(member.reason))
+    run = member.key.directory(root) / manifest.stages[-1]
+    try:
+        found = json.loads((run / "eval" / SUMMARY_FILE).read_text(encoding="utf-8"))
+        assert {*ALIKE, "measures", "steps_trained"} <= found.keys()
+    except FileNotFoundError:
+        return "done, but without an evaluation"
+    except (OSError, ValueError, AttributeError, AssertionError):
+        return "done, but its evaluation cannot be read"
+    return found
+
+
+def _check_alike(
+    root: Path, first: tuple[Member, dict], other: tuple[Member, dict]
+) -> None:
+    """Raises InputError where two evaluations cannot be compared."""
+    for key in ALIKE:
+        if first[1][key] != other[1][key]:
+            source = f"{root}: evaluation of {other[0].key}"
+            valid = f"{first[1][key]}, as of {first[0].key}"
+            raise InputError(source, key, other[1][key], valid)

@@ -1,0 +1,110 @@
+import math
+
+import pytest
+from support.synthetic_sweep import study, write_sweep
+
+from envs.errors import InputError
+from fingers_mjx.studies.comparison.comparison import check_complete, compared
+from fingers_mjx.studies.comparison.results import read_results
+from fingers_mjx.studies.comparison.tables import difference_rows, notes
+from fingers_mjx.studies.statistics.compare import ONE_SEED
+from fingers_mjx.studies.sweep.manifest import read_manifest
+
+GAINS = {
+    "lift": [0.02, 0.03, 0.025, 0.015, 0.02],
+    "same": [0.001, -0.001, 0, 0.002, -0.002],
+}
+SPEED = "task_speed_mps"
+
+
+def results(tmp_path, values, states=None):
+    path = write_sweep(tmp_path / "s", values, states, curves=False)
+    return read_results(path, read_manifest(path))
+
+
+def test_a_known_gain_is_found_and_none_is_not(tmp_path):
+    found = compared(results(tmp_path, study(GAINS)), "base", [SPEED])
+    lift, same = found.rows
+    assert (lift.configuration, same.configuration) == ("lift", "same")
+    assert lift.difference.mean == pytest.approx(0.022)
+    assert lift.difference.low < 0.022 < lift.difference.high
+    assert lift.difference.in_favour == 5
+    assert lift.p_holm < 0.01
+    assert same.difference.low < 0 < same.difference.high
+    assert same.p_holm > 0.05
+
+
+def test_all_rows_are_corrected_together(tmp_path):
+    one = compared(
+        results(tmp_path / "1", study({"lift": GAINS["lift"]})), "base", [SPEED]
+    )
+    assert one.rows[0].p_holm == one.rows[0].difference.p
+    both = compared(results(tmp_path / "2", study(GAINS)), "base", [SPEED, "energy_j"])
+    assert len(both.rows) == 4
+    assert both.rows[0].p_holm == pytest.approx(4 * both.rows[0].difference.p)
+    assert notes(both)[0].startswith("4 comparisons")
+
+
+def test_less_of_an_error_is_better_and_energy_is_neither(tmp_path):
+    measures = ["turn_rate_error_rad_s", "energy_j"]
+    slip, energy = compared(
+        results(tmp_path, study({"lift": GAINS["lift"]})), "base", measures
+    ).rows
+    assert (slip.better, slip.difference.in_favour) == ("lower", 5)
+    assert slip.difference.mean < 0 < slip.difference.improvement
+    assert (energy.better, energy.difference.in_favour) == (None, None)
+
+
+def test_measures_without_a_direction_are_compared_only_when_named(tmp_path):
+    found = compared(results(tmp_path, study(GAINS)), "base")
+    assert found.measures == ("survival", SPEED, "turn_rate_error_rad_s")
+
+
+def test_seeds_that_are_missing_are_dropped_pairwise_and_named(tmp_path):
+    states = {("lift", 3): ("diverged", "loss not finite")}
+    whole = results(tmp_path, study(GAINS), states)
+    with pytest.raises(InputError, match="1 of 15 members missing: lift/3"):
+        check_complete(whole, "s")
+    found = compared(whole, "base", [SPEED])
+    lift, same = found.rows
+    assert (lift.difference.n, lift.difference.dropped) == (4, 1)
+    assert lift.difference.mean == pytest.approx((0.02 + 0.03 + 0.025 + 0.02) / 4)
+    assert same.difference.n == 5
+    said = "\n".join(notes(found))
+    assert "lift/3, diverged" in said
+    assert "left out" in said
+
+
+def test_one_seed_proves_nothing(tmp_path):
+    found = compared(results(tmp_path, study({"lift": 0.02}, 1)), "base", [SPEED])
+    (row,) = found.rows
+    assert (row.difference.low, row.difference.p, row.p_holm) == (None, None, None)
+    assert ONE_SEED in "\n".join(notes(found)).lower()
+    assert difference_rows(found)[0][3] == "–"
+
+
+def test_an_undefined_value_is_left_out_and_named(tmp_path):
+    values = study(GAINS)
+    values["lift"][2][SPEED] = math.nan
+    found = compared(results(tmp_path, values), "base", [SPEED])
+    assert found.rows[0].difference.n == 4
+    assert f"{SPEED} of lift/2" in "\n".join(notes(found))
+
+
+@pytest.mark.parametrize(
+    ("baseline", "measures", "match"),
+    [
+        ("bose", None, "--baseline: found bose; valid: one of base, lift, same.*base?"),
+        ("base", ["speed"], "--measures: found speed; valid: one of energy_j, surv"),
+    ],
+)
+def test_unknown_names_are_refused_with_the_valid_ones(
+    tmp_path, baseline, measures, match
+):
+    with pytest.raises(InputError, match=match):
+        compared(results(tmp_path, study(GAINS)), baseline, measures)
+
+
+def test_one_configuration_cannot_be_compared(tmp_path):
+    with pytest.raises(InputError, match="two configurations"):
+        compared(results(tmp_path, study({})), "base")
