@@ -14,7 +14,11 @@ from collections.abc import Sequence
 from typing import NoReturn
 
 from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
-from fingers_mjx.cli.installation import check_installation, check_places
+from fingers_mjx.cli.installation import (
+    UnsupportedInstallation,
+    check_installation,
+    check_places,
+)
 
 COMMANDS = ("train", "evaluate", "sweep", "compare", "export", "play", "hand")
 SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
@@ -116,6 +120,8 @@ def _status(error: Exception) -> int | None:
         return BAD_INPUT
     if isinstance(error, ModuleNotFoundError):
         return BAD_INPUT if error.name in _EXTRAS else None
+    if isinstance(error, UnsupportedInstallation):  # ours cannot even be imported
+        return error.exit_code
     from fingers_mjx.training.errors import exit_status
 
     return exit_status(error)
