@@ -24,6 +24,7 @@ def add(commands) -> None:
         "Compare the configurations of a sweep with a baseline, seed by seed. Prints "
         "one table; writes it as JSON, Parquet and one HTML page with all seeds and "
         "learning curves.",
+        computes=False,
     )
     options.path(parser, "sweep", metavar="DIR", help="directory of fingers sweep")
     what = "configuration that the others are compared with"
