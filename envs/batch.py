@@ -39,8 +39,16 @@ class BatchEnv:
         return self.env.dt
 
     def reset(self, key: PRNGKeyArray) -> State:
-        """Begins `num_envs` worlds, world i from the i-th split of the key."""
-        return jax.vmap(self.env.reset)(jax.random.split(key, self.num_envs))
+        """Begins `num_envs` worlds, world i from the i-th split of the key.
+
+        Args:
+            key: one, or several, each for an equal part of the worlds: that part is
+                what a batch of its size alone would begin with.
+        """
+        keys = jnp.atleast_1d(key)
+        share = self.num_envs // keys.size
+        split = jax.vmap(lambda one: jax.random.split(one, share))(keys)
+        return jax.vmap(self.env.reset)(split.reshape(self.num_envs))
 
     def step(self, state: State, action: Float[Array, "b a"]) -> State:
         """Advances every world by one control step, x_i ← f(x_i, a_i).

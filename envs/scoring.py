@@ -7,6 +7,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from envs.base import State
 from envs.errors import InputError, one_of
 from envs.memory import PerWorldState
 from rewards import (
@@ -70,6 +71,18 @@ def scheduled_weights(
     for name, value in values.items():
         weights = weights | {name: _with_value(weights[name], value)}
     return {k: _with_time_scale(w, curriculum_scale) for k, w in weights.items()}
+
+
+def with_weights(state: State, weights: Mapping[str, Schedule]) -> State:
+    """Returns `state` with other reward weights, which episodes to come keep.
+
+    Args:
+        state: of one world, or of many.
+        weights: schedules as from `scheduled_weights`; for many worlds with a leading
+            axis of their number.
+    """
+    world = state.memory.world.replace(weights=dict(weights))
+    return state.replace(memory=state.memory.replace(world=world))
 
 
 def score(

@@ -58,19 +58,22 @@ def ppo(batch: BatchEnv, repeat: int) -> Layer:
     del repeat
     from fingers_mjx.ppo.config import PpoConfig
     from fingers_mjx.ppo.iteration import compile_iterations, make_iteration
+    from fingers_mjx.ppo.members import stacked
+    from fingers_mjx.ppo.scalars import scalars_of
     from fingers_mjx.ppo.state import init_train_state, make_learner
 
     config = PpoConfig()
     learner = make_learner(batch, config)
     iterate = compile_iterations(make_iteration(batch, learner))
+    scalars = stacked([scalars_of(config)])
     carry = [
-        init_train_state(learner, batch, jax.random.key(0)),
+        stacked([init_train_state(learner, batch, jax.random.key(0))]),
         jax.jit(batch.reset)(jax.random.key(1)),
-        jax.random.key(2),
+        jax.random.key(2)[None],
     ]
 
     def call() -> None:
-        *carry[:], _ = iterate(*carry)
+        *carry[:], _ = iterate(scalars, *carry)
         jax.block_until_ready(carry[0])
 
     return Layer(call, config.unroll_length)

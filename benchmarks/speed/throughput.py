@@ -42,7 +42,7 @@ def main() -> None:
     """Runs the layers that were asked for and prints the table."""
     args = _arguments()
     worlds = args.num_envs or (8192 if args.backend == "warp" else 256)
-    print(f"{worlds} worlds of {args.task}, {_machine()}", flush=True)
+    print(f"{worlds} worlds of {args.task}, {machine()}", flush=True)
     wanted = [(args.backend, name) for name in args.layers or LAYERS]
     if args.against:
         wanted.append((args.against, "environment"))
@@ -60,8 +60,8 @@ def main() -> None:
             {"backend": k[0], "layer": k[1], "steps_per_s": rate, "note": notes[k]}
             for k, rate in rates.items()
         ]
-        record = {"task": args.task, "num_envs": worlds, "machine": _machine()}
-        record |= {"versions": _versions(), "layers": rows, "ratios": ratios}
+        record = {"task": args.task, "num_envs": worlds, "machine": machine()}
+        record |= {"versions": versions(), "layers": rows, "ratios": ratios}
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
@@ -154,13 +154,14 @@ def _ratios(
     return ratios
 
 
-def _machine() -> str:
+def machine() -> str:
     """What the numbers were taken on; nothing that names the machine."""
     device = jax.devices()[0].device_kind
     return f"{os.cpu_count()} cores ({platform.machine()}), JAX on {device}"
 
 
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Returns the versions that the speed depends on most."""
     return {"jax": jax.__version__, "mujoco": mujoco.__version__}
 
 

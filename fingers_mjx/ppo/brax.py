@@ -4,7 +4,6 @@ Brax's own `ppo.train` is one function that cannot save or restore the whole tra
 state, so `fingers_mjx.ppo.iteration` is built from Brax's parts instead.
 """
 
-import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -21,6 +20,7 @@ from flax import linen
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from fingers_mjx.ppo.config import PpoConfig
+from fingers_mjx.ppo.scalars import PpoScalars
 
 __all__ = [
     "PPONetworkParams",
@@ -74,7 +74,7 @@ def make_optimizer(config: PpoConfig) -> optax.GradientTransformation:
 
 
 def adapt_learning_rate(
-    state: optax.OptState, kl: Float[Array, ""], config: PpoConfig
+    state: optax.OptState, kl: Float[Array, ""], scalars: PpoScalars
 ) -> optax.OptState:
     """Returns `state` with the rate divided or multiplied by 1.5 as the KL asks.
 
@@ -88,9 +88,9 @@ def adapt_learning_rate(
     adapted, _ = optimizer.adaptive_kl_learning_rate(
         own,  # pyright: ignore[reportArgumentType]
         kl,
-        config.desired_kl,
-        config.learning_rate_min,
-        config.learning_rate_max,
+        scalars.desired_kl,  # pyright: ignore[reportArgumentType]
+        scalars.learning_rate_min,  # pyright: ignore[reportArgumentType]
+        scalars.learning_rate_max,  # pyright: ignore[reportArgumentType]
     )
     return adapted
 
@@ -104,23 +104,37 @@ def learning_rate(state: optax.OptState) -> Float[Array, ""]:
     return state[-1].hyperparams["learning_rate"]  # pyright: ignore
 
 
-def brax_loss(ppo_networks: PPONetworks, config: PpoConfig) -> Any:
-    """Returns Brax's PPO loss (params, normalizer, data, key) -> (loss, terms).
+def brax_loss(ppo_networks: PPONetworks) -> Any:
+    """Returns Brax's loss (params, scalars, normalizer, data, key) -> (loss, terms).
 
     `data` is a Transition of [worlds, time, ...]; of `next_observation` only the last
     time is read, so it may have length one. Truncated steps do not contribute.
     """
-    return functools.partial(
-        losses.compute_ppo_loss,
-        ppo_network=ppo_networks,
-        entropy_cost=config.entropy_cost,
-        discounting=config.discount,
-        reward_scaling=config.reward_scale,
-        gae_lambda=config.gae_lambda,
-        clipping_epsilon=config.clip,
-        normalize_advantage=True,
-        vf_coefficient=config.value_cost,
-    )
+
+    def loss(
+        params: PPONetworkParams,
+        scalars: PpoScalars,
+        normalizer: RunningStatisticsState,
+        data: Transition,
+        key: PRNGKeyArray,
+    ) -> Any:
+        numbers: Any = scalars
+        return losses.compute_ppo_loss(
+            params,
+            normalizer,
+            data,
+            key,
+            ppo_networks,
+            entropy_cost=numbers.entropy_cost,
+            discounting=numbers.discount,
+            reward_scaling=numbers.reward_scale,
+            gae_lambda=numbers.gae_lambda,
+            clipping_epsilon=numbers.clip,
+            normalize_advantage=True,
+            vf_coefficient=numbers.value_cost,
+        )
+
+    return loss
 
 
 def init_normalizer(observation_size: Mapping[str, int]) -> RunningStatisticsState:

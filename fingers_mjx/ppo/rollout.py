@@ -11,6 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from envs.base import State, VectorEnv
 from envs.physics.room import ROOM
 from fingers_mjx.ppo.brax import sample_action
+from fingers_mjx.ppo.members import each, flat, parts
 from fingers_mjx.ppo.state import Learner, TrainState, fixed_types
 from fingers_mjx.ppo.totals import Totals, count, total
 
@@ -55,38 +56,80 @@ def unroll(
     learner: Learner,
     train: TrainState,
     state: State,
-    key: PRNGKeyArray,
+    keys: PRNGKeyArray,
 ) -> tuple[State, Rollout, Totals]:
     """Returns the worlds after `unroll_length` steps, their experience and metrics.
 
-    a_t ~ π(· | o_t), s_{t+1} = step(s_t, a_t) in every world.
+    a_t ~ π_m(· | o_t), s_{t+1} = step(s_t, a_t) in every world of every member m.
 
     A step is not valid if the environment reports it (`info["invalid"]`), or if its
     reward, or the observation before or after it, is not finite. It is then truncated
     with reward zero, which takes it out of loss and normalizer; the other worlds are
     not touched.
+
+    Args:
+        env: worlds of all members, in equal parts.
+        learner: networks and settings that all share.
+        train: of all members, which come first in each leaf.
+        state: of all worlds.
+        keys: one random key per member.
     """
-    networks = learner.networks
+    members = keys.shape[0]
 
-    def act(state: State, key: PRNGKeyArray) -> tuple[State, dict[str, Any]]:
+    def act(
+        train: TrainState, obs: dict[str, Array], key: PRNGKeyArray
+    ) -> dict[str, Any]:
+        apply = learner.networks.policy_network.apply
+        logits = apply(train.normalizer, train.params.policy, obs)
+        action, log_prob = sample_action(learner.networks, logits, key)
+        return {"action": action, "log_prob": log_prob, "logits": logits}
+
+    def step(state: State, keys: PRNGKeyArray) -> tuple[State, dict[str, Any]]:
         obs, obs_ok = screen(state.obs)
-        logits = networks.policy_network.apply(
-            train.normalizer, train.params.policy, obs
-        )
-        action, log_prob = sample_action(networks, logits, key)
-        state = fixed_types(env.step(state, action))
-        drawn = {"obs": obs, "action": action, "log_prob": log_prob, "logits": logits}
-        return state, {**drawn, "obs_ok": obs_ok, **_outcome(state)}
+        drawn = flat(each(act)(train, parts(obs, members), keys))
+        state = fixed_types(env.step(state, drawn["action"]))
+        seen = {"obs": obs, "obs_ok": obs_ok, **drawn}
+        return state, {**seen, **_outcome(state, members)}
 
-    keys = jax.random.split(key, learner.config.unroll_length)
-    state, steps = jax.lax.scan(act, state, keys)
+    length = learner.config.unroll_length
+    times = jax.vmap(lambda key: jax.random.split(key, length), out_axes=1)(keys)
+    state, steps = jax.lax.scan(step, state, times)
     last_obs, last_ok = screen(state.obs)
     ok = jnp.concatenate([steps.pop("obs_ok"), last_ok[None]])
-    totals = jax.tree.map(lambda x: jnp.sum(x, axis=0), steps.pop("totals"))
-    for name, hit in steps.pop("overflow").items():
-        totals[f"{name}_worlds"] = count(jnp.any(hit, axis=0))
+    sums, overflow = steps.pop("totals"), steps.pop("overflow")
     rollout = _seal(steps, ok[:-1] & ok[1:], last_obs["privileged_state"])
-    return state, rollout, totals | rollout_totals(rollout)
+    rollout = _of_members(rollout, members)
+    totals = each(_totals)(_members_first(sums), _worlds_of(overflow, members), rollout)
+    return state, rollout, totals
+
+
+def _members_first(steps: Any) -> Any:
+    """Returns leaves [time, S, …] as [S, time, …]."""
+    return jax.tree.map(lambda x: jnp.moveaxis(x, 1, 0), steps)
+
+
+def _worlds_of(steps: Any, members: int) -> Any:
+    """Returns leaves [time, S·W, …] as [S, time, W, …]."""
+    split = jax.tree.map(lambda x: x.reshape(len(x), members, -1, *x.shape[2:]), steps)
+    return _members_first(split)
+
+
+def _of_members(rollout: Rollout, members: int) -> Rollout:
+    """Returns the experience of a flat batch with the members first."""
+    steps = {k: v for k, v in vars(rollout).items() if k != "last_obs"}
+    return Rollout(
+        last_obs=parts(rollout.last_obs, members), **_worlds_of(steps, members)
+    )
+
+
+def _totals(
+    sums: Totals, overflow: dict[str, Bool[Array, "t b"]], rollout: Rollout
+) -> Totals:
+    """Returns the metrics of one member: of its steps and of its whole rollout."""
+    totals = {name: jnp.sum(x, axis=0) for name, x in sums.items()}
+    for name, hit in overflow.items():
+        totals[f"{name}_worlds"] = count(jnp.any(hit, axis=0))
+    return totals | rollout_totals(rollout)
 
 
 def screen(
@@ -105,25 +148,31 @@ def screen(
     return {k: jnp.where(ok[:, None], x, 0.0) for k, x in obs.items()}, ok
 
 
-def _outcome(state: State) -> dict[str, Any]:
+def _outcome(state: State, members: int) -> dict[str, Any]:
     """Returns what one step gave: reward, endings, faults and metrics."""
     reported, finite = state.info["invalid"] != 0, jnp.isfinite(state.reward)
+    seen = (state.metrics, state.info, state.done, ~reported & finite)
     return {
         "reward": state.reward,
         "done": state.done,
         "truncation": state.info["truncation"],
         "fault": jnp.where(reported, 1, jnp.where(finite, 0, 2)),
-        "totals": _step_totals(state, ~reported & finite),
+        "totals": each(_step_totals)(*parts(seen, members)),
         "overflow": {k: state.metrics[k] > 0 for k in ROOM if k in state.metrics},
     }
 
 
-def _step_totals(state: State, healthy: Bool[Array, " b"]) -> Totals:
+def _step_totals(
+    metrics: Mapping[str, Float[Array, " b"]],
+    info: Mapping[str, Float[Array, " b"]],
+    done: Float[Array, " b"],
+    healthy: Bool[Array, " b"],
+) -> Totals:
     """Returns return and length of the episodes that ended, and the mean metrics."""
-    ended = (state.done > 0) & healthy
-    totals = {name: total(x, healthy) for name, x in state.metrics.items()}
-    totals["episode/return"] = total(state.info["episode_return"], ended)
-    totals["episode/length"] = total(state.info["episode_length"], ended)
+    ended = (done > 0) & healthy
+    totals = {name: total(x, healthy) for name, x in metrics.items()}
+    totals["episode/return"] = total(info["episode_return"], ended)
+    totals["episode/length"] = total(info["episode_length"], ended)
     return totals
 
 

@@ -72,9 +72,7 @@ class Learner:
 def make_learner(env: VectorEnv, config: PpoConfig) -> Learner:
     """Returns the parts that fit the observations and actions of `env`."""
     networks = make_networks(env.observation_size, env.action_size, config)
-    return Learner(
-        networks, make_optimizer(config), brax_loss(networks, config), config
-    )
+    return Learner(networks, make_optimizer(config), brax_loss(networks), config)
 
 
 def init_train_state(learner: Learner, env: VectorEnv, key: PRNGKeyArray) -> TrainState:

@@ -18,6 +18,7 @@ from fingers_mjx.ppo.brax import (
 )
 from fingers_mjx.ppo.health import finite_terms, note_faults, record, term_names
 from fingers_mjx.ppo.rollout import Rollout
+from fingers_mjx.ppo.scalars import PpoScalars
 from fingers_mjx.ppo.state import Learner, TrainState
 from fingers_mjx.ppo.totals import Totals, total
 
@@ -32,7 +33,11 @@ LOSS_TERMS = {
 
 
 def improve(
-    learner: Learner, train: TrainState, rollout: Rollout, key: PRNGKeyArray
+    learner: Learner,
+    scalars: PpoScalars,
+    train: TrainState,
+    rollout: Rollout,
+    key: PRNGKeyArray,
 ) -> tuple[TrainState, Totals]:
     """Returns `train` after all updates on `rollout`, and the metrics of the updates.
 
@@ -46,7 +51,7 @@ def improve(
     )
     updates = config.epochs * config.minibatches
     batches = deals.reshape(updates, -1), jax.random.split(key_loss, updates)
-    update = functools.partial(_update, learner, rollout)
+    update = functools.partial(_update, learner, scalars, rollout)
     train, totals = jax.lax.scan(update, train, batches)
     train = dataclasses.replace(
         train,
@@ -70,6 +75,7 @@ def watched_names(params: Any) -> list[str]:
 
 def _update(
     learner: Learner,
+    scalars: PpoScalars,
     rollout: Rollout,
     train: TrainState,
     batch: tuple[Int[Array, " n"], PRNGKeyArray],
@@ -78,9 +84,9 @@ def _update(
     index, key = batch
     loss_and_gradient = jax.value_and_grad(learner.loss, has_aux=True)
     (_, terms), gradient = loss_and_gradient(
-        train.params, train.normalizer, minibatch(rollout, index), key
+        train.params, scalars, train.normalizer, minibatch(rollout, index), key
     )
-    optimizer = adapt_learning_rate(train.optimizer, terms["kl_mean"], learner.config)
+    optimizer = adapt_learning_rate(train.optimizer, terms["kl_mean"], scalars)
     step, optimizer = learner.optimizer.update(gradient, optimizer)  # pyright: ignore
     params = optax.apply_updates(train.params, step)  # pyright: ignore
     finite = finite_terms(watched(train.params, terms, gradient))

@@ -120,17 +120,22 @@ def checkpoints(directory: Path) -> list[Path]:
     return sorted(p for p in directory.glob("[0-9]" * 8) if p.is_dir())
 
 
-def newest(directory: Path, say: Callable[[str], None]) -> Path | None:
+def newest(
+    directory: Path, say: Callable[[str], None], at_most: int | None = None
+) -> Path | None:
     """Returns the newest checkpoint that is intact; None if none was ever written.
 
     Args:
         directory: of all checkpoints of the run.
         say: called with one sentence for each checkpoint that is passed over.
+        at_most: last iteration that it may be of; any if not given.
 
     Raises:
         InputError: if there are checkpoints, but none is intact.
     """
     found = checkpoints(directory)
+    if at_most is not None:
+        found = [path for path in found if int(path.name) <= at_most]
     for path in reversed(found):
         fault = problem(path, int(path.name))
         if not fault:
@@ -142,10 +147,15 @@ def newest(directory: Path, say: Callable[[str], None]) -> Path | None:
 
 
 def set_aside(directory: Path, after: int) -> None:
-    """Renames the (damaged) checkpoints later than iteration `after` to "damaged-…"."""
+    """Renames checkpoints later than iteration `after`, such as damaged ones.
+
+    Their names then begin with "damaged-", or with "ahead-" if they are intact: those
+    of a population's members that were saved before it was killed.
+    """
     for path in checkpoints(directory):
-        if int(path.name) > after:
-            target = path.with_name(f"damaged-{path.name}")
+        if (iteration := int(path.name)) > after:
+            kind = "damaged" if problem(path, iteration) else "ahead"
+            target = path.with_name(f"{kind}-{path.name}")
             shutil.rmtree(target, ignore_errors=True)
             path.rename(target)
 

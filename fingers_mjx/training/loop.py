@@ -1,8 +1,8 @@
-"""The loop of a run: advance, check health, log, save, stop."""
+"""The loop of a run or a population: advance, check health, log, save, stop."""
 
 import math
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,9 +13,9 @@ from envs.physics.room import ROOM, too_little_room
 from fingers_mjx.ppo.state import Carry
 from fingers_mjx.ppo.totals import means
 from fingers_mjx.runs import checkpoint
-from fingers_mjx.runs.metrics import MetricsLog
 from fingers_mjx.training.dump import dump_state
 from fingers_mjx.training.errors import Diverged, Interrupted
+from fingers_mjx.training.member import Place
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.row import Window, speed
 from fingers_mjx.training.session import Report, Session
@@ -27,36 +27,21 @@ GO_ON = ", or on_overflow=warn to go on without them; either also with --resume"
 
 @dataclass(frozen=True)
 class LoopServices:
-    """Where the loop writes to and what it listens to.
+    """What the loop reports to and listens to.
 
     Attributes:
-        path: run directory.
-        bound: what a resumed run must share.
-        env_config: settings of the task.
-        log: learning curve.
+        places: of the members' files.
         on_progress: called with every event.
         stop: whether a signal asks the run to stop.
         watchdog: ends a run that no longer advances.
         ticker: reports "compiling" until the first call is done.
     """
 
-    path: Path
-    bound: Mapping[str, Any]
-    env_config: Any
-    log: MetricsLog
+    places: Sequence[Place]
     on_progress: OnProgress
     stop: StopSignals
     watchdog: Watchdog
     ticker: Ticker
-
-    @property
-    def checkpoints(self) -> Path:
-        """Directory of the checkpoints."""
-        return self.path / "checkpoints"
-
-    def note(self, sentence: str) -> None:
-        """Reports a sentence for the user."""
-        self.on_progress({"event": "note", "text": sentence})
 
 
 @dataclass(frozen=True)
@@ -64,55 +49,61 @@ class StartPoint:
     """State from which the loop goes on.
 
     Attributes:
-        carry: state of the run.
+        carry: state of all members.
         iteration: iterations done.
         trained_s: time spent on them [s].
-        saved: checkpoint of that state, if it comes from one.
+        saved: checkpoint of that state of each member, None where there is none.
+        ended: why a member no longer learns, None where it does.
     """
 
     carry: Carry
-    iteration: int = 0
-    trained_s: float = 0.0
-    saved: Path | None = None
+    iteration: int
+    trained_s: float
+    saved: Sequence[Path | None]
+    ended: Sequence[Diverged | None]
 
 
 class Loop:
     """Drives a session from iteration to iteration.
 
     One call is always in flight while the next is prepared, so that the device does
-    not wait for Python; its health is examined before the call after it.
+    not wait for Python; its health is examined before the call after it. A member that
+    diverges no longer changes (`fingers_mjx.ppo.iteration`) and writes no more files;
+    the others go on.
     """
 
     def __init__(self, session: Session, services: LoopServices, start: StartPoint):
-        self.session, self.services, self.config = session, services, session.config
+        self.session, self.services = session, services
+        self.config = session.setups[0].train
         self.carry, self.iteration = start.carry, start.iteration
-        self.saved = start.saved
+        self.saved: list[Path | None] = list(start.saved)
+        self.ended: list[Diverged | None] = list(start.ended)
         self._flying: Report | None = None
         self._flying_to = start.iteration
         self._window = Window()
-        self._noted = -1
+        self._noted = [-1] * session.members
         self._calls = 0
         self._began_s = time.monotonic() - start.trained_s
         self._mark_s = time.monotonic()
 
-    def run(self) -> Path:
-        """Trains to the end and returns the last checkpoint.
+    def run(self) -> list[Diverged | None]:
+        """Trains to the end, with a checkpoint there, and returns who diverged.
 
         Raises:
-            Diverged: when too many updates in a row were not finite.
             InputError: when contacts were dropped and `on_overflow` is "stop".
             Interrupted: when a signal asked for it; a checkpoint has been written.
             OutOfSpace: when the disk is full.
         """
-        while self.iteration < self.config.iterations:
+        while self.iteration < self.config.iterations and not all(self.ended):
             self._advance()
             if self._due(self.config.log_every):
                 self._log()
             if self.services.stop.requested:
-                raise Interrupted(self._save(), self.iteration)
+                raise Interrupted(self.save(), self.iteration)
             if self._due(self.config.checkpoint_every):
-                self._save()
-        return self._save()
+                self.save()
+        self.save()
+        return self.ended
 
     def _due(self, every: int) -> bool:
         """Whether something done every so many iterations is due."""
@@ -123,7 +114,7 @@ class Loop:
         self.carry, report = self.session.advance(self.carry)
         self.iteration += self.config.iterations_per_call
         self._window.sums.append(report.sums)
-        self.saved = None
+        self.saved = [None] * len(self.saved)
         self._land()
         self._flying, self._flying_to = report, self.iteration
         self._calls += 1
@@ -141,79 +132,106 @@ class Loop:
         self.services.watchdog.beat()
 
     def _land(self) -> None:
-        """Waits for the call in flight and examines its health."""
+        """Waits for the call in flight and examines the health of its members."""
         if self._flying is None:
             return
-        self._health = self._flying.fetch_health()
+        report, self._flying = self._flying, None
+        self._health = report.fetch_health()
         if self.config.on_overflow == "stop":
-            metrics = means(self.session.names, self._flying.fetch_sums())
-            self._report_overflow(metrics, f"iteration {self._flying_to}")
-        self._flying = None
-        if self._health["worst_streak"] >= self.config.ppo.max_bad_updates:
-            raise self._divergence(self._health)
+            for index, sums in enumerate(report.fetch_sums()):
+                metrics = means(self.session.names, sums)
+                self._report_overflow(index, metrics, f"iteration {self._flying_to}")
+        for index, health in enumerate(self._health):
+            bad = health["worst_streak"] >= self.config.ppo.max_bad_updates
+            if bad and self.ended[index] is None:
+                self.ended[index] = self._divergence(index, health)
 
-    def _report_overflow(self, metrics: Mapping[str, float], when: str) -> None:
+    def _report_overflow(
+        self, index: int, metrics: Mapping[str, float], when: str
+    ) -> None:
         """Stops the run where contacts were dropped, or notes it and goes on."""
-        worlds, settings = self.config.num_envs, self.services.env_config
-        for error in _overflows(metrics, when, worlds, settings):
+        place, worlds = self.services.places[index], self.config.num_envs
+        for error in _overflows(metrics, place.named(when), worlds, place.setup.env):
             if self.config.on_overflow == "stop":
                 raise error
-            self.services.note(str(error))
+            self._note(place, str(error))
 
-    def _divergence(self, health: Mapping[str, int]) -> Diverged:
-        """Saves the state for inspection and returns the error that names it."""
+    def _divergence(self, index: int, health: Mapping[str, int]) -> Diverged:
+        """Saves a member's state for inspection; returns the error that names it."""
+        place, carry = self.services.places[index], self.session.split(self.carry)
         iteration = health["first_iteration"]
-        name = f"diverged-{iteration:08d}.npz"
-        dump = dump_state(self.services.path / name, self.carry)
-        good = checkpoint.checkpoints(self.services.checkpoints)
+        dump = dump_state(place.path / f"diverged-{iteration:08d}.npz", carry[index])
+        good = checkpoint.checkpoints(place.checkpoints)
         term = self.session.terms[health["first_term"]]
         streak = health["worst_streak"]
-        return Diverged(term, iteration, streak, dump, good[-1] if good else None)
+        error = Diverged(term, iteration, streak, dump, good[-1] if good else None)
+        place.note_end(error)
+        if self.session.members > 1:
+            self._note(place, place.named(str(error)))
+        return error
 
     def _log(self) -> None:
         """Fetches the metrics since the last row and appends their means."""
         self._land()
-        config, metrics = self.config, self._window.means(self.session.names)
-        row = {
+        sums = self._window.total()
+        common = {
             "iteration": self.iteration,
-            "iterations": config.iterations,
-            "env_steps": self.iteration * config.steps_per_iteration,
+            "iterations": self.config.iterations,
+            "env_steps": self.iteration * self.config.steps_per_iteration,
             "time_s": time.time(),
             "elapsed_s": time.monotonic() - self._began_s,
-            **speed(self._window, config, self.iteration),
-            **metrics,
-            "updates_skipped": self._health["skipped"],
+            **speed(self._window, self.config, self.iteration),
         }
         self._window = Window()
-        self.services.log.append(row)
-        self.services.on_progress({"event": "progress", **row})
-        self._note_fault()
-        self._report_overflow(metrics, "since the last row")
+        for index, place in enumerate(self.services.places):
+            if self.ended[index] is None:
+                metrics = dict(means(self.session.names, sums[index]))
+                self._log_member(index, place, {**common, **metrics})
 
-    def _note_fault(self) -> None:
-        """Reports the latest step that was set aside, once."""
-        if self._health["fault_iteration"] > self._noted:
-            self._noted = self._health["fault_iteration"]
-            self.services.note(self.session.fault(self._health))
+    def _log_member(self, index: int, place: Place, row: dict[str, Any]) -> None:
+        """Appends the row of one member and reports what happened in it."""
+        health = self._health[index]
+        row["updates_skipped"] = health["skipped"]
+        place.log.append(row)
+        self.services.on_progress({"event": "progress", **place.label, **row})
+        if health["fault_iteration"] > self._noted[index]:
+            self._noted[index] = health["fault_iteration"]
+            self._note(place, place.named(self.session.fault(health)))
+        self._report_overflow(index, row, "since the last row")
 
-    def _save(self) -> Path:
-        """Writes a checkpoint of the present iteration, unless there is one."""
+    def _note(self, place: Place, sentence: str) -> None:
+        """Reports a sentence for the user."""
+        self.services.on_progress({"event": "note", **place.label, "text": sentence})
+
+    def save(self) -> Path:
+        """Writes the checkpoints of the present iteration that are missing.
+
+        Of a population one more is kept: killed between two members, all still have
+        the one before.
+        """
         self._land()
-        if self.saved is None:
-            meta = {
-                "bound": self.services.bound,
-                "config": to_dict(self.config),
-                "env_steps": self.iteration * self.config.steps_per_iteration,
-                "trained_s": time.monotonic() - self._began_s,
-            }
-            directory, keep = self.services.checkpoints, self.config.keep_checkpoints
-            self.saved = checkpoint.save(
-                directory, self.iteration, self.carry, meta, keep
-            )
-            event = {"event": "checkpoint", "path": str(self.saved)}
-            self.services.on_progress(event | {"iteration": self.iteration})
+        keep = self.config.keep_checkpoints + (self.session.members > 1)
+        live = [i for i, error in enumerate(self.ended) if error is None]
+        if any(self.saved[index] is None for index in live):
+            carries = self.session.split(self.carry)
+            for index in live:
+                self.saved[index] = self._save_member(index, carries[index], keep)
             self._mark_s = time.monotonic()
-        return self.saved
+        return next(path for path in [*self.saved, Path()] if path is not None)
+
+    def _save_member(self, index: int, carry: Carry, keep: int) -> Path:
+        """Writes the checkpoint of one member and returns its path."""
+        place = self.services.places[index]
+        meta = {
+            "bound": place.bound,
+            "config": to_dict(place.setup.train),
+            "env_steps": self.iteration * self.config.steps_per_iteration,
+            "trained_s": time.monotonic() - self._began_s,
+        }
+        saved = checkpoint.save(place.checkpoints, self.iteration, carry, meta, keep)
+        event = {"event": "checkpoint", **place.label, "path": str(saved)}
+        self.services.on_progress(event | {"iteration": self.iteration})
+        return saved
 
 
 def _overflows(

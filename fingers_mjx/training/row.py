@@ -28,7 +28,6 @@ import numpy as np
 from jaxtyping import Float
 
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.ppo.totals import means
 
 
 @dataclass
@@ -36,7 +35,7 @@ class Window:
     """Metrics of the iterations since the last row.
 
     Attributes:
-        sums: sum and weight of each metric, per call; still on the device.
+        sums: sum and weight of each member's metrics, per call; on the device.
         timed_s: time of the calls in which nothing was compiled [s].
         timed_iterations: iterations of those calls.
     """
@@ -50,10 +49,13 @@ class Window:
         self.timed_s += elapsed_s
         self.timed_iterations += iterations
 
-    def means(self, names: list[str]) -> dict[str, float]:
-        """Fetches the sums and returns the mean of each metric."""
-        sums: Float[np.ndarray, "k 2"] = np.sum([np.asarray(s) for s in self.sums], 0)
-        return dict(means(names, sums))
+    def total(self) -> Float[np.ndarray, "s k 2"]:
+        """Fetches (Σ w x, Σ w) [its unit, 1] of each metric of each member.
+
+        Source:
+            Ours, see `fingers_mjx.ppo.totals.total`.
+        """
+        return np.sum([np.asarray(s) for s in self.sums], 0)
 
 
 def speed(window: Window, config: TrainConfig, iteration: int) -> dict[str, float]:

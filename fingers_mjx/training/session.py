@@ -1,19 +1,25 @@
-"""A run in memory: environment, learner, the carried state and the compiled call."""
+"""A population in memory: environment, learners, the carried state, the compiled call.
 
-from collections.abc import Callable, Mapping
+A single run is a population of one member.
+"""
+
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, Int, PRNGKeyArray
 
 from envs.base import State, VectorEnv
 from envs.config.typed import to_dict
-from fingers_mjx.ppo.config import TrainConfig, bound_fields
+from envs.scoring import scheduled_weights, with_weights
+from fingers_mjx.ppo.config import bound_fields
 from fingers_mjx.ppo.iteration import Iteration, make_iteration, repeat_iterations
+from fingers_mjx.ppo.members import flat, member_of, parts, stacked
 from fingers_mjx.ppo.rollout import FAULTS
+from fingers_mjx.ppo.scalars import PpoScalars, scalars_of
 from fingers_mjx.ppo.state import (
     Carry,
     TrainState,
@@ -42,14 +48,14 @@ class Report:
     """What a call leaves on the device for the host to fetch when it wants to.
 
     Attributes:
-        sums: sum and weight of each metric.
-        health: the fields `HEALTH`.
+        sums: sum and weight of each metric of each member.
+        health: the fields `HEALTH` of each member.
     """
 
-    sums: Array
-    health: Array
+    sums: Float[Array, "s k 2"]
+    health: Int[Array, "s h"]
 
-    def fetch_sums(self) -> Float[np.ndarray, "k 2"]:
+    def fetch_sums(self) -> Float[np.ndarray, "s k 2"]:
         """Waits for the call and returns (Σ w x, Σ w) [its unit, 1] of each metric.
 
         Source:
@@ -57,47 +63,61 @@ class Report:
         """
         return np.asarray(self.sums)
 
-    def fetch_health(self) -> dict[str, int]:
-        """Waits for the call and returns its health."""
-        return dict(zip(HEALTH, np.asarray(self.health).tolist(), strict=True))
+    def fetch_health(self) -> list[dict[str, int]]:
+        """Waits for the call and returns the health of each member."""
+        rows = np.asarray(self.health).tolist()
+        return [dict(zip(HEALTH, row, strict=True)) for row in rows]
 
 
 class Session:
-    """Compiled training of one environment.
+    """Compiled training of one environment by one or more learners.
 
     Args:
-        env: batched environment.
-        config: of the run.
+        env: worlds of all members, in equal parts.
+        setups: of the members; they differ in seed and `VARYING` settings alone
+            (`fingers_mjx.training.population`).
 
     Attributes:
+        members: how many there are.
         names: of the metrics, in the order of `Report.sums`.
         terms: names that `Health.first_term` points into.
     """
 
-    def __init__(self, env: VectorEnv, config: TrainConfig):
-        self.env, self.config = env, config
+    def __init__(self, env: VectorEnv, setups: Sequence[Setup]):
+        self.env, self.setups, self.members = env, tuple(setups), len(setups)
+        config = setups[0].train
         self.learner = make_learner(env, config.ppo)
+        self._scalars = stacked([scalars_of(setup.train.ppo) for setup in setups])
         iteration = repeat_iterations(
             make_iteration(env, self.learner), config.iterations_per_call
         )
-        template = self.template()
-        shapes = jax.eval_shape(iteration, *_parts(template))
+        whole = jax.eval_shape(self._start)
+        shapes = jax.eval_shape(iteration, self._scalars, *_parts(whole))
         self.names = sorted(shapes[3])
-        self.terms = watched_names(template.train.params)
-        self._call = jax.jit(_reporting(iteration), donate_argnums=(0, 1, 2))
+        self.terms = watched_names(whole.train.params)
+        self._call = jax.jit(_reporting(iteration), donate_argnums=(1, 2, 3))
+        self._split, self._join = jax.jit(self._part), jax.jit(_joined)
 
     def template(self) -> Carry:
-        """Returns shapes and types of the carried state."""
-        return jax.eval_shape(self._start, jax.random.key(0))
+        """Returns shapes and types of the state of one member."""
+        return jax.eval_shape(lambda: self._part(self._start())[0])
 
     def start(self) -> Carry:
-        """Returns the carried state of an untrained run."""
-        return strong(jax.jit(self._start)(jax.random.key(self.config.seed)))
+        """Returns the carried state of an untrained population."""
+        return strong(jax.jit(self._start)())
 
     def advance(self, carry: Carry) -> tuple[Carry, Report]:
         """Starts the next call and returns without waiting; `carry` is used up."""
-        *parts, sums, health = self._call(*_parts(carry))
-        return Carry(*parts), Report(sums, health)
+        *after, sums, health = self._call(self._scalars, *_parts(carry))
+        return Carry(*after), Report(sums, health)
+
+    def split(self, carry: Carry) -> list[Carry]:
+        """Returns the state of each member, as a run of its own would carry it."""
+        return self._split(carry)
+
+    def join(self, carries: Sequence[Carry]) -> Carry:
+        """Returns the state of the population of the members' states."""
+        return self._join(list(carries))
 
     def fault(self, health: Mapping[str, int]) -> str:
         """Returns one sentence on the latest step that was set aside."""
@@ -107,11 +127,41 @@ class Session:
             f"{health['fault_world']} is not finite; the step was set aside"
         )
 
-    def _start(self, key: PRNGKeyArray) -> Carry:
-        """Returns fresh networks, worlds and key, all from one seed."""
-        key, key_worlds, key_networks = jax.random.split(key, 3)
-        train = init_train_state(self.learner, self.env, key_networks)
-        return Carry(train, self.env.reset(key_worlds), key)
+    def _start(self) -> Carry:
+        """Returns fresh networks, worlds and key of each member, all from its seed."""
+        seeds = [jax.random.key(setup.train.seed) for setup in self.setups]
+        keys, world_keys, network_keys = zip(*map(_three, seeds), strict=True)
+        trains = [
+            self._untrained(setup, key)
+            for setup, key in zip(self.setups, network_keys, strict=True)
+        ]
+        worlds = self._with_own_weights(self.env.reset(jnp.stack(world_keys)))
+        return Carry(stacked(trains), worlds, jnp.stack(keys))
+
+    def _untrained(self, setup: Setup, key: PRNGKeyArray) -> TrainState:
+        """Returns what a member starts from; only that depends on some settings."""
+        learner = make_learner(self.env, setup.train.ppo)
+        return init_train_state(learner, self.env, key)
+
+    def _with_own_weights(self, worlds: State) -> State:
+        """Gives the worlds of each member the reward weights and the pace it is set."""
+        if self.members == 1:
+            return worlds
+        env: Any = self.env
+        weights = [
+            scheduled_weights(env.table, s.env.weights, s.env.curriculum_scale)
+            for s in self.setups
+        ]
+        worlds_each = self.env.num_envs // self.members
+        repeated = jax.tree.map(
+            lambda x: jnp.repeat(x, worlds_each, axis=0), stacked(weights)
+        )
+        return with_weights(worlds, repeated)
+
+    def _part(self, carry: Carry) -> list[Carry]:
+        """Returns the state of each member; see `split`."""
+        stack = Carry(carry.train, parts(carry.worlds, self.members), carry.key)
+        return [member_of(stack, index) for index in range(self.members)]
 
 
 def bound(env: VectorEnv, setup: Setup, identity: Mapping[str, Any]) -> dict[str, Any]:
@@ -131,22 +181,36 @@ def bound(env: VectorEnv, setup: Setup, identity: Mapping[str, Any]) -> dict[str
     }
 
 
+def _three(key: PRNGKeyArray) -> tuple[PRNGKeyArray, PRNGKeyArray, PRNGKeyArray]:
+    """Returns the keys of a run, of its worlds and of its networks."""
+    key, worlds, networks = jax.random.split(key, 3)
+    return key, worlds, networks
+
+
+def _joined(carries: list[Carry]) -> Carry:
+    """Returns the state of the population; see `Session.join`."""
+    stack = stacked(carries)
+    return Carry(stack.train, flat(stack.worlds), stack.key)
+
+
 def _parts(carry: Carry) -> tuple[TrainState, State, PRNGKeyArray]:
-    """Returns the three arguments of an iteration."""
+    """Returns the three arguments of an iteration that a call uses up."""
     return carry.train, carry.worlds, carry.key
 
 
-def _reporting(iteration: Iteration) -> Callable[..., tuple]:
+def _reporting(iteration: Iteration) -> Iteration:
     """Returns `iteration` with its metrics and health packed into two arrays."""
 
-    def call(train: TrainState, worlds: State, key: PRNGKeyArray) -> tuple:
-        train, worlds, key, totals = iteration(train, worlds, key)
-        health = jnp.stack([getattr(train.health, name) for name in HEALTH])
-        return train, worlds, key, _pack(totals), health
+    def call(
+        scalars: PpoScalars, train: TrainState, worlds: State, keys: PRNGKeyArray
+    ) -> Any:
+        train, worlds, keys, totals = iteration(scalars, train, worlds, keys)
+        health = jnp.stack([getattr(train.health, name) for name in HEALTH], axis=-1)
+        return train, worlds, keys, _pack(totals), health
 
     return call
 
 
-def _pack(totals: Totals) -> Float[Array, "k 2"]:
+def _pack(totals: Totals) -> Float[Array, "s k 2"]:
     """Returns the totals as one array, in the order of their names."""
-    return jnp.stack([totals[name] for name in sorted(totals)])
+    return jnp.stack([totals[name] for name in sorted(totals)], axis=1)

@@ -1,26 +1,36 @@
-"""The training driver: from a configuration to a run directory, and on again."""
+"""The training driver: from configurations to run directories, and on again."""
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from envs.base import VectorEnv
-from envs.errors import InputError
 from fingers_mjx.ppo.config import check_config, free_fields
-from fingers_mjx.ppo.state import TrainState, strong, train_template
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
+from fingers_mjx.training.errors import Diverged
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
+from fingers_mjx.training.member import END_FILE, Place, read_end
+from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.progress import OnProgress, Ticker
-from fingers_mjx.training.schedules import steps_done, with_steps
 from fingers_mjx.training.session import Session, bound
 from fingers_mjx.training.signals import StopSignals
-from fingers_mjx.training.warm_start import completed, started_from
+from fingers_mjx.training.start import (
+    FRESH,
+    Brought,
+    Start,
+    brought,
+    fresh,
+    restored,
+)
 from fingers_mjx.training.watchdog import Watchdog
+
+__all__ = ["FRESH", "Member", "Result", "Start", "train", "train_population"]
 
 TICK_S = 1.0
 """Time between two reports of compilation."""
@@ -28,48 +38,21 @@ TICK_S = 1.0
 
 @dataclass(frozen=True)
 class Result:
-    """What a finished run gave.
+    """What a run gave.
 
     Attributes:
         run_dir: directory of the run.
-        checkpoint: last checkpoint.
-        iterations: done in all.
-        metrics: last row of the learning curve.
+        checkpoint: last checkpoint; None if it diverged before the first.
+        iterations: done up to that checkpoint.
+        metrics: last row of the learning curve; empty if there is none.
+        diverged: why it stopped learning, None if it did not.
     """
 
     run_dir: Path
-    checkpoint: Path
+    checkpoint: Path | None
     iterations: int
     metrics: Mapping[str, Any]
-
-
-@dataclass(frozen=True)
-class Start:
-    """How a run begins: afresh unless stated otherwise.
-
-    Attributes:
-        resume: go on from the newest intact checkpoint of the run directory.
-        warm_start: run directory, checkpoint or bundle whose networks the new run
-            starts from (`fingers_mjx.training.warm_start`); all else starts afresh.
-        keep_schedules: curricula go on from the control steps that the run of
-            `warm_start` has done (`fingers_mjx.training.schedules`).
-
-    Raises:
-        InputError: `warm_start` with `resume`, or `keep_schedules` without it.
-    """
-
-    resume: bool = False
-    warm_start: Path | None = None
-    keep_schedules: bool = False
-
-    def __post_init__(self) -> None:
-        if self.resume and self.warm_start:
-            raise InputError("--warm-start", "", self.warm_start, "without --resume")
-        if self.keep_schedules and not self.warm_start:
-            raise InputError("--schedules", "", "keep", "with --warm-start RUN")
-
-
-FRESH = Start()
+    diverged: Diverged | None = None
 
 
 def train(
@@ -101,75 +84,135 @@ def train(
         Interrupted: after SIGINT or SIGTERM, with a checkpoint written.
         OutOfSpace: when the disk is full; earlier checkpoints are intact.
     """
-    config = setup.train
-    check_config(config)
-    steps, learned = _counted(start), _learned(env, setup, start)
+    member = Member(setup, run_dir, start)
+    [result] = train_population(
+        env, [member], identity=identity, on_progress=on_progress
+    )
+    if result.diverged is not None:
+        raise result.diverged
+    return result
+
+
+def train_population(
+    env: VectorEnv,
+    members: Sequence[Member],
+    *,
+    identity: Mapping[str, Any] | None = None,
+    on_progress: OnProgress = lambda event: None,
+) -> list[Result]:
+    """Trains all members in one program; each leaves an ordinary run directory.
+
+    A member that diverges is frozen, reported and left out of its files; the others go
+    on. On the CPU each member is to the last bit what `train` alone would make of it.
+
+    Args:
+        env: worlds of all members, `num_envs` each, made from any of their setups.
+        members: what each learns and where; see `check_population` for what they
+            share. Those whose start resumes go on from the newest iteration that all
+            of them have saved.
+        identity: as in `train`.
+        on_progress: as in `train`; with several members, events of one have its
+            directory's name as "member".
+
+    Raises:
+        InputError, Interrupted, OutOfSpace: as in `train`.
+    """
+    check_population(members)
+    for member in members:
+        check_config(member.setup.train)
+    given = [brought(env, member.setup, member.start) for member in members]
     use_compile_cache()
+    with ExitStack() as stack:
+        paths = [
+            stack.enter_context(open_run(m.run_dir, m.start.resume)) for m in members
+        ]
+        shared = [bound(env, m.setup, identity or {}) for m in members]
+        ended = _ended(members, paths, shared)
+        if not all(ended):
+            files = list(zip(members, paths, shared, ended, strict=True))
+            ended = _run(env, files, given, on_progress)
+    return [_result(path, error) for path, error in zip(paths, ended, strict=True)]
+
+
+Files = tuple[Member, Path, Mapping[str, Any], Diverged | None]
+"""A member, its open directory, what a resumed run must share, and how it ended."""
+
+
+def _run(
+    env: VectorEnv,
+    files: Sequence[Files],
+    given: Sequence[Brought | None],
+    on_progress: OnProgress,
+) -> list[Diverged | None]:
+    """Trains in open directories and returns who diverged."""
 
     def say(text: str) -> None:
         on_progress({"event": "note", "text": text})
 
-    with (
-        open_run(run_dir, start.resume) as path,
-        StopSignals(say) as stop,
-        Watchdog(path / "hang.txt", config.hang_limit_s) as watchdog,
-        Ticker(on_progress, TICK_S) as ticker,
-    ):
-        shared = bound(env, setup, identity or {})
-        if start.resume:
-            check_bound(path, shared, {f"env.{x}" for x in free_fields(setup.env)})
-        session = Session(env, config)
-        newest = _newest(path, say) if start.resume else None
-        begin = (
-            _restored(session, newest) if newest else _fresh(session, learned, steps)
-        )
-        record_run(path, {"train": config, "env": setup.env}, shared, setup.hand)
-        with MetricsLog(path, begin.iteration) as log:
-            services = LoopServices(
-                path, shared, setup.env, log, on_progress, stop, watchdog, ticker
-            )
-            saved = Loop(session, services, begin).run()
+    setups, paths = [f[0].setup for f in files], [f[1] for f in files]
+    with ExitStack() as stack:
+        stop = stack.enter_context(StopSignals(say))
+        report, limit_s = paths[0] / "hang.txt", setups[0].train.hang_limit_s
+        watchdog = stack.enter_context(Watchdog(report, limit_s))
+        ticker = stack.enter_context(Ticker(on_progress, TICK_S))
+        session = Session(env, setups)
+        begin = _begin(session, files, given, say)
+        places = [_place(stack, one, begin, len(files)) for one in files]
+        services = LoopServices(places, on_progress, stop, watchdog, ticker)
+        loop = Loop(session, services, begin)
+        if any(given):
+            loop.save()  # a run stopped early must not lose what it began with
+        for place in places:
+            config = {"train": place.setup.train, "env": place.setup.env}
+            record_run(place.path, config, place.bound, place.setup.hand)
+        return loop.run()
+
+
+def _ended(
+    members: Sequence[Member], paths: Sequence[Path], shared: Sequence[Mapping]
+) -> list[Diverged | None]:
+    """Checks the runs to go on with and returns which members had diverged.
+
+    A run of its own that diverged may be resumed: from its last checkpoint.
+    """
+    ended: list[Diverged | None] = []
+    for member, path, facts in zip(members, paths, shared, strict=True):
+        if member.start.resume:
+            env = member.setup.env
+            check_bound(path, facts, {f"env.{x}" for x in free_fields(env)})
+        if len(members) == 1:
+            (path / END_FILE).unlink(missing_ok=True)
+        ended.append(read_end(path))
+    return ended
+
+
+def _begin(
+    session: Session,
+    files: Sequence[Files],
+    given: Sequence[Brought | None],
+    say: Callable[[str], None],
+) -> StartPoint:
+    """Returns the state that all members have saved, or that of a new population."""
+    begin = None
+    if all(member.start.resume for member, *_ in files):
+        directories = [path / "checkpoints" for _, path, *_ in files]
+        ended = [error for *_, error in files]
+        begin = restored(session, directories, ended, say)
+    return begin or fresh(session, given)
+
+
+def _place(stack: ExitStack, files: Files, begin: StartPoint, members: int) -> Place:
+    """Opens the curve of a member; one that had diverged keeps all its rows."""
+    member, path, facts, error = files
+    last = member.setup.train.iterations if error else begin.iteration
+    log = stack.enter_context(MetricsLog(path, last))
+    return Place(path.name if members > 1 else "", path, member.setup, facts, log)
+
+
+def _result(path: Path, error: Diverged | None) -> Result:
+    """Returns what the run at `path` gave."""
+    saved = checkpoint.checkpoints(path / "checkpoints")
     rows = read_metrics(path / "metrics.jsonl")
-    return Result(path, saved, int(saved.name), rows[-1])
-
-
-def _learned(env: VectorEnv, setup: Setup, start: Start) -> TrainState | None:
-    """Reads what a warm start brings, before anything is written."""
-    if start.warm_start is None:
-        return None
-    return started_from(train_template(env, setup.train.ppo), env, start.warm_start)
-
-
-def _counted(start: Start) -> int:
-    """Reads from where schedules go on, before anything is written."""
-    if start.warm_start is None or not start.keep_schedules:
-        return 0
-    return steps_done(start.warm_start)
-
-
-def _newest(path: Path, say: Callable[[str], None]) -> Path | None:
-    """Returns the newest intact checkpoint of a run, and puts away what is not."""
-    directory = path / "checkpoints"
-    checkpoint.clean(directory)
-    newest = checkpoint.newest(directory, say)
-    if newest is not None:
-        checkpoint.set_aside(directory, int(newest.name))
-        say(f"going on from {newest}")
-    return newest
-
-
-def _restored(session: Session, path: Path) -> StartPoint:
-    """Returns the state saved at `path`."""
-    saved = checkpoint.load(path)
-    carry = strong(saved.into(session.template()))
-    return StartPoint(carry, saved.iteration, saved.meta["trained_s"], path)
-
-
-def _fresh(session: Session, learned: TrainState | None, steps: int) -> StartPoint:
-    """Returns the state of a new run, with what was `learned` and counted elsewhere."""
-    carry = session.start()
-    if steps:
-        carry = replace(carry, worlds=with_steps(carry.worlds, steps))
-    if learned is not None:
-        carry = replace(carry, train=strong(completed(learned, carry.train)))
-    return StartPoint(carry)
+    done = int(saved[-1].name) if saved else 0
+    last = saved[-1] if saved else None
+    return Result(path, last, done, rows[-1] if rows else {}, error)

@@ -51,7 +51,9 @@ class Probe:
         return {"state": 1, "privileged_state": 2}
 
     def reset(self, key):
-        keys = jax.random.split(key, self.num_envs)
+        members = jnp.atleast_1d(key)
+        share = self.num_envs // members.size
+        keys = jax.vmap(lambda one: jax.random.split(one, share))(members).reshape(-1)
         fault = self.fault
         data = {
             "kind": jnp.int32(self.kind),

@@ -18,6 +18,7 @@ from fingers_mjx.ppo.health import (
     term_names,
 )
 from fingers_mjx.ppo.rollout import Rollout
+from fingers_mjx.ppo.scalars import scalars_of
 from fingers_mjx.ppo.state import init_train_state, make_learner
 from fingers_mjx.ppo.update import improve, watched_names
 
@@ -38,7 +39,7 @@ def with_gain(x, gain):
 with_gain.defvjp(lambda x, gain: (x, gain), lambda gain, up: (up * gain, gain * 0.0))
 
 
-def fake_loss(params, normalizer, data, key):
+def fake_loss(params, scalars, normalizer, data, key):
     """A square of the parameters, spoiled at the site that the reward names."""
     site, value = data.reward[0, 0], data.reward[0, 1]
 
@@ -57,7 +58,8 @@ def fake_loss(params, normalizer, data, key):
 
 
 LEARNER = dataclasses.replace(make_learner(ENV, CONFIG), loss=fake_loss)
-IMPROVE = jax.jit(lambda train, rollout, key: improve(LEARNER, train, rollout, key))
+SCALARS = scalars_of(CONFIG)
+IMPROVE = jax.jit(lambda *given: improve(LEARNER, SCALARS, *given))
 
 
 def rollout(site, value=np.nan):

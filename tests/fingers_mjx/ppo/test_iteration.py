@@ -17,6 +17,8 @@ from support.probe_envs import Fault, probe
 from fingers_mjx.ppo.brax import make_networks
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.iteration import compile_iterations, make_iteration
+from fingers_mjx.ppo.members import member_of, stacked
+from fingers_mjx.ppo.scalars import scalars_of
 from fingers_mjx.ppo.state import init_train_state, make_learner, strong
 from fingers_mjx.ppo.totals import means
 
@@ -38,13 +40,15 @@ LEARNER = make_learner(probe("constant"), SMALL)
 @functools.cache
 def compiled(repeat=1):
     """The iteration is the same function for every probe: it is compiled once."""
-    return compile_iterations(make_iteration(probe("constant"), LEARNER), repeat)
+    iterate = compile_iterations(make_iteration(probe("constant"), LEARNER), repeat)
+    return functools.partial(iterate, stacked([scalars_of(SMALL)]))
 
 
 def start(env, seed=0):
     key, key_env, key_nets = jax.random.split(jax.random.key(seed), 3)
     worlds = strong(jax.jit(env.reset)(key_env))
-    return init_train_state(LEARNER, env, key_nets), worlds, key
+    train = init_train_state(LEARNER, env, key_nets)
+    return stacked([train]), worlds, key[None]
 
 
 def learn(env, iterations, seed=0):
@@ -52,7 +56,8 @@ def learn(env, iterations, seed=0):
     for _ in range(iterations):
         *carry, totals = compiled()(*carry)
         sums.append(totals)
-    return carry, {k: sum(np.asarray(t[k]) for t in sums) for k in sums[0]}
+    totals = {k: sum(np.asarray(t[k][0]) for t in sums) for k in sums[0]}
+    return (member_of(carry[0], 0), *carry[1:]), totals
 
 
 def value_of(train, seen):
@@ -111,7 +116,7 @@ def test_truncation_is_not_an_end():
 def test_best_action_is_found():
     (train, *_), _ = learn(probe("target_action"), 80)
     np.testing.assert_allclose(action_of(train, [0.0]), 0.7, atol=0.1)
-    (untrained, *_) = start(probe("target_action"))
+    untrained = member_of(start(probe("target_action"))[0], 0)
     assert abs(action_of(untrained, [0.0])[0] - 0.7) > 0.3  # negative control
 
 
@@ -128,10 +133,11 @@ def test_same_seed_gives_the_same_state_and_another_does_not():
 def test_repeated_iterations_equal_single_ones():
     (train, *_), sums = learn(probe("seen_action"), 3)
     repeated, *_, totals = compiled(repeat=3)(*start(probe("seen_action")))
+    repeated = member_of(repeated, 0)
     for one, other in zip(arrays(train.params), arrays(repeated.params), strict=True):
         np.testing.assert_allclose(one, other, rtol=1e-3, atol=1e-5)
     for name, value in totals.items():
-        np.testing.assert_allclose(value, sums[name], rtol=1e-2, atol=1e-4)
+        np.testing.assert_allclose(value[0], sums[name], rtol=1e-2, atol=1e-4)
 
 
 def test_later_calls_do_not_compile():
@@ -170,14 +176,14 @@ def test_fault_of_one_world_is_set_aside(site, value):
     *clean, clean_totals = compiled()(*clean)
     *spoiled, totals = compiled()(*spoiled)
     # an observation spoils the step that leads to it and the step that starts from it
-    assert totals["invalid"][0] == (1 if site == "reward" else 2)
-    assert clean_totals["invalid"][0] == 0
+    assert totals["invalid"][0, 0] == (1 if site == "reward" else 2)
+    assert clean_totals["invalid"][0, 0] == 0
     assert all(np.isfinite(x).all() for x in arrays(spoiled[0]))
     for one, other in zip(arrays(clean[1].obs), arrays(spoiled[1].obs), strict=True):
         others = np.arange(64) != 3
         np.testing.assert_array_equal(one[others], other[others])
     count = [np.asarray(s.normalizer.count.lo) for s in (clean[0], spoiled[0])]
-    assert count[0] - count[1] == totals["invalid"][0]
+    assert count[0] - count[1] == totals["invalid"][0, 0]
 
 
 def test_world_reported_invalid_does_not_teach():

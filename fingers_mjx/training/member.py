@@ -1,0 +1,83 @@
+"""A member of a population on disk: an ordinary run directory, and how it ended."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from envs.errors import InputError
+from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.metrics import MetricsLog
+from fingers_mjx.runs.setup import Setup
+from fingers_mjx.training.errors import Diverged
+
+END_FILE = "diverged.json"
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a member's state and learning curve go.
+
+    Attributes:
+        name: of the member in messages and events; empty for a run of its own.
+        path: run directory.
+        setup: settings and hand.
+        bound: what a resumed run must share.
+        log: learning curve.
+    """
+
+    name: str
+    path: Path
+    setup: Setup
+    bound: Mapping[str, Any]
+    log: MetricsLog
+
+    @property
+    def checkpoints(self) -> Path:
+        """Directory of the checkpoints."""
+        return self.path / "checkpoints"
+
+    @property
+    def label(self) -> dict[str, str]:
+        """What marks the member's events; nothing for a run of its own."""
+        return {"member": self.name} if self.name else {}
+
+    def named(self, sentence: str) -> str:
+        """Returns `sentence` with the member's name before it."""
+        return f"{self.name}: {sentence}" if self.name else sentence
+
+    def note_end(self, error: Diverged) -> None:
+        """Writes why the member stopped learning."""
+        found = {
+            "term": error.term,
+            "iteration": error.iteration,
+            "skipped": error.skipped,
+            "dump": error.dump.name,
+            "checkpoint": error.checkpoint.name if error.checkpoint else None,
+        }
+        text = json.dumps(found, indent=1) + "\n"
+        write_whole(self.path / END_FILE, text.encode())
+
+
+def read_end(path: Path) -> Diverged | None:
+    """Returns why the run at `path` stopped learning, None if it did not.
+
+    Raises:
+        InputError: a file that `Place.note_end` did not write.
+    """
+    file = path / END_FILE
+    if not file.exists():
+        return None
+    try:
+        found = json.loads(file.read_text(encoding="utf-8"))
+        good = found["checkpoint"]
+        return Diverged(
+            found["term"],
+            found["iteration"],
+            found["skipped"],
+            path / found["dump"],
+            path / "checkpoints" / good if good else None,
+        )
+    except (ValueError, KeyError, TypeError) as error:
+        raise InputError(file, "", error, "the file that training writes") from error
