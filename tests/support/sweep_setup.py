@@ -6,7 +6,9 @@ from pathlib import Path
 
 from support.sweep_worker import planned
 
+from envs.config.strict_yaml import write_yaml
 from envs.config.typed import from_dict
+from fingers_mjx.cli.main import main
 from fingers_mjx.studies.sweep.book import Book
 from fingers_mjx.studies.sweep.engine import local
 from fingers_mjx.studies.sweep.ray_cluster import LOOPBACK, ray_cluster
@@ -61,15 +63,25 @@ def run_fake(root, make=local, **changes):
         return run_sweep(book, make(spec, root, WORKER), lambda event: None)
 
 
-def run_on_two_nodes(root):
-    """Runs a sweep on a Ray cluster of two nodes on loopback."""
+def run_on_two_nodes(root, source=None):
+    """Runs a sweep on a Ray cluster of two nodes on loopback.
+
+    With a specification, `fingers sweep` trains it there; without, it is pretended.
+    """
     from ray.cluster_utils import Cluster
 
     node = {"num_cpus": 1, "node_ip_address": LOOPBACK, "include_dashboard": False}
     cluster = Cluster(initialize_head=True, head_node_args=node)
     cluster.add_node(**node)
+    on = {"engine": "ray", "address": cluster.address}
     try:
-        run_fake(root, ray_cluster, engine="ray", address=cluster.address)
+        if source is None:
+            run_fake(root, ray_cluster, **on)
+        else:
+            text = source.read_text("utf-8") + write_yaml(on)
+            there = source.with_name("ray.yaml")
+            there.write_text(text, "utf-8")
+            assert main(["sweep", str(there), "-o", str(root)]) == 0
     finally:
         cluster.shutdown()
 
@@ -92,5 +104,8 @@ def journal(root):
 
 
 if __name__ == "__main__":
-    run = run_on_two_nodes if "ray" in sys.argv else run_fake
-    run(Path(sys.argv[1]))
+    root, *words = sys.argv[1:]
+    if words[:1] == ["ray"]:
+        run_on_two_nodes(Path(root), *map(Path, words[1:]))
+    else:
+        run_fake(Path(root))

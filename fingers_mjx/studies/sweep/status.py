@@ -77,12 +77,12 @@ def in_progress(root: Path) -> bool:
 
 def table(found: list[Standing]) -> RenderableType:
     """Returns the table of a sweep: first what runs or failed, last what is done."""
-    table = Table(box=None, pad_edge=False)
+    table = Table(box=None, pad_edge=False, expand=True)
     for name in ("member", "state", "stage"):
         table.add_column(name, no_wrap=True)
     for name in ("iteration", "steps/s", "ETA"):
         table.add_column(name, justify="right", no_wrap=True)
-    table.add_column("reason", overflow="ellipsis", no_wrap=True)
+    table.add_column("reason", overflow="ellipsis", no_wrap=True, ratio=1)
     order = list(COLORS)
     for one in sorted(found, key=lambda one: order.index(one.member.state)):
         member = one.member
