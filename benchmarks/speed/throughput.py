@@ -32,6 +32,7 @@ from benchmarks.speed.bare import Layer
 from benchmarks.speed.layers import LAYERS
 from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
+from envs.rounding import fix_rounding
 
 ROUNDS = 5
 Key = tuple[str, str]
@@ -40,6 +41,7 @@ Key = tuple[str, str]
 
 def main() -> None:
     """Runs the layers that were asked for and prints the table."""
+    fix_rounding()  # as the commands do
     args = _arguments()
     worlds = args.num_envs or (8192 if args.backend == "warp" else 256)
     print(f"{worlds} worlds of {args.task}, {machine()}", flush=True)

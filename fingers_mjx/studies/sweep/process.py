@@ -10,6 +10,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
+from envs.rounding import VARIABLE as XLA
+from envs.rounding import fix_rounding
+
 WORKER = (sys.executable, "-P", "-m", "fingers_mjx.studies.sweep.worker")
 """Command of a worker; what it trains follows."""
 CORES = "fingers-cores-{user}"
@@ -110,7 +113,8 @@ def worker_environment(threads: int | None, backend: str | None) -> dict[str, st
     """Returns the variables of a worker.
 
     XLA and BLAS split sums among their threads, so that the last bits of a result
-    depend on their number: it is fixed, whichever machine a worker gets to.
+    depend on their number: it is fixed, whichever machine a worker gets to, and so is
+    what `fix_rounding` asks for.
 
     Args:
         threads: of a worker; as many as it finds cores if None.
@@ -119,6 +123,8 @@ def worker_environment(threads: int | None, backend: str | None) -> dict[str, st
     here = str(Path(__file__).parents[3])
     path = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH", ""))))
     found = {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1", "TF_CPP_MIN_LOG_LEVEL": "3"}
+    found[XLA] = os.environ.get(XLA, "")
+    fix_rounding(found)
     if backend != "warp":
         found["JAX_PLATFORMS"] = "cpu"
     if threads is not None:
