@@ -180,15 +180,17 @@ def test_rewards_in_the_reference_are_those_of_the_code(page, table):
     assert sorted(names) == sorted(row.name for row in getattr(rewards, table))
 
 
-SWEEPS = re.findall(
-    r"```yaml\n(task:.*?)```",
-    (ROOT / "docs/guides/studies.md").read_text("utf-8"),
-    re.DOTALL,
-)
+SWEEPS = [
+    text
+    for page in ("guides/studies.md", "reference/paper.md")
+    for text in re.findall(
+        r"```yaml\n(task:.*?)```", (ROOT / "docs" / page).read_text("utf-8"), re.DOTALL
+    )
+]
 
 
 @pytest.mark.parametrize("text", SWEEPS, ids=range(len(SWEEPS)))
-def test_sweeps_in_the_guide_can_begin(tmp_path, text):
+def test_sweeps_in_the_documents_can_begin(tmp_path, text):
     from envs.config.typed import load_yaml
     from fingers_mjx.studies.sweep.resolve import keep_sweep
     from fingers_mjx.studies.sweep.spec import Sweep
@@ -198,4 +200,4 @@ def test_sweeps_in_the_guide_can_begin(tmp_path, text):
     (tmp_path / "sweep").mkdir()
     spec = load_yaml(Sweep, source)
     made = keep_sweep(spec, source, tmp_path / "sweep")
-    assert len(SWEEPS) == 3 and made.configurations
+    assert len(SWEEPS) == 4 and made.configurations
