@@ -1,4 +1,4 @@
-"""A worker that only pretends to train, with faults: python … ROOT NAME SEED.
+"""A worker that only pretends to train, with faults: python … ROOT NAME SEED [NAME …].
 
 The file `planned(ROOT)` says what goes wrong in which attempt, {"lift/1": ["killed"]};
 after the list, all goes well. ROOT/journal.txt gets a line when one begins or ends.
@@ -101,8 +101,12 @@ def train(root, name, seed):
 
 if __name__ == "__main__":
     threading.Thread(target=end_with_parent, daemon=True).start()
-    root, (name, seed) = Path(sys.argv[1]), sys.argv[2:]
-    journal(root, "begin", f"{name}/{seed}")
-    status = train(root, name, seed)
-    journal(root, "end", f"{name}/{seed}")
-    sys.exit(status)
+    root, words = Path(sys.argv[1]), sys.argv[2:]
+    members = list(zip(words[::2], words[1::2], strict=True))
+    for name, seed in members:
+        journal(root, "begin", f"{name}/{seed}")
+    statuses = []
+    for name, seed in members:
+        statuses.append(train(root, name, seed))
+        journal(root, "end", f"{name}/{seed}")
+    sys.exit(max(statuses))

@@ -23,26 +23,32 @@ class Job(Protocol):
         ...
 
 
+Failures = Callable[[Key], int]
+"""How often a member failed since the sweep was started."""
+Choose = Callable[[Sequence[Key], Failures], tuple[Key, ...]]
+
+
 @dataclass(frozen=True)
 class Engine:
     """Where members are trained.
 
     Attributes:
         slots: workers at the same time.
-        choose: of the members that wait, those that the next worker trains.
+        choose: of the members that wait, at least one, those that the next worker
+            trains.
         launch: starts a worker for members.
         close: called at the end.
     """
 
     slots: int
-    choose: Callable[[Sequence[Key]], tuple[Key, ...]]
+    choose: Choose
     launch: Callable[[Sequence[Key]], Job]
     close: Callable[[], None] = lambda: None
 
 
-def one_by_one(waiting: Sequence[Key]) -> tuple[Key, ...]:
+def one_by_one(waiting: Sequence[Key], failures: Failures) -> tuple[Key, ...]:
     """Returns the first member alone."""
-    return tuple(waiting[:1])
+    return (waiting[0],)
 
 
 def local(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engine:
@@ -53,13 +59,29 @@ def local(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engine:
         root: directory of the sweep, absolute.
         command: of a worker.
     """
+    slots = spec.processes or default_processes(spec)
+    return worker_engine(spec, root, command, slots, one_by_one)
+
+
+def worker_engine(
+    spec: Sweep, root: Path, command: Sequence[str], slots: int, choose: Choose
+) -> Engine:
+    """Returns an engine whose workers are processes of this machine.
+
+    Args:
+        spec: resolved.
+        root: directory of the sweep, absolute.
+        command: of a worker.
+        slots: processes at the same time.
+        choose: what a worker trains.
+    """
 
     def launch(keys: Sequence[Key]) -> Job:
         words, log = worker_words(command, root, keys)
         environment = worker_environment(spec.threads, spec.backend)
         return Process(words, log, environment, spec.threads)
 
-    return Engine(spec.processes or default_processes(spec), one_by_one, launch)
+    return Engine(slots, choose, launch)
 
 
 def default_processes(spec: Sweep) -> int:
@@ -78,8 +100,16 @@ def default_processes(spec: Sweep) -> int:
 def worker_words(
     command: Sequence[str], root: Path, keys: Sequence[Key]
 ) -> tuple[list[str], Path]:
-    """Returns the command line of a worker and its log, that of its first member."""
-    words = [*command, str(root)]
+    """Returns the command line of a worker and its log, that of its first member.
+
+    The logs of the other members say where it is.
+    """
+    words, (first, *others) = [*command, str(root)], keys
     for key in keys:
         words += [key.configuration, str(key.seed)]
-    return words, keys[0].directory(root) / LOG_FILE
+    for key in others:
+        log = key.directory(root) / LOG_FILE
+        log.parent.mkdir(parents=True, exist_ok=True)
+        with log.open("a", encoding="utf-8") as stream:
+            print(f"in one program with {first}, whose log has the lines", file=stream)
+    return words, first.directory(root) / LOG_FILE

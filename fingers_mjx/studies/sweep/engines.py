@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from fingers_mjx.studies.sweep.engine import Engine, local
+from fingers_mjx.studies.sweep.population import population
 from fingers_mjx.studies.sweep.ray_cluster import ray_cluster
 from fingers_mjx.studies.sweep.spec import Sweep
 
@@ -17,5 +18,5 @@ def make_engine(spec: Sweep, root: Path) -> Engine:
     Raises:
         InputError: the engine is not installed, or its cluster cannot be reached.
     """
-    make = {"local": local, "ray": ray_cluster, "population": local}
+    make = {"local": local, "ray": ray_cluster, "population": population}
     return make[spec.engine or "local"](spec, root)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import shutil
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingers_mjx.evaluation import source as evaluating
@@ -13,8 +13,10 @@ from fingers_mjx.runs.setup import make_env, overridden
 from fingers_mjx.studies.sweep.outcome import is_evaluated
 from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
 from fingers_mjx.studies.sweep.spec import Evaluation, Sweep
+from fingers_mjx.training.population import Member
 from fingers_mjx.training.progress import OnProgress
-from fingers_mjx.training.train import Start, train
+from fingers_mjx.training.start import Start
+from fingers_mjx.training.train import train_population
 from fingers_mjx.training.watchdog import Watchdog
 
 HANG_FILE = "hang.txt"
@@ -32,32 +34,41 @@ def train_members(
         on_progress: called with the events of `fingers_mjx.training.progress`.
 
     Returns:
-        What ended single members, while the others went on.
+        Members that diverged, while the others went on.
 
     Raises:
-        InputError, Diverged, Interrupted, OutOfSpace: as `fingers_mjx.training.train`.
+        InputError, Interrupted, OutOfSpace: as `fingers_mjx.training.train`.
     """
-    (key,) = keys
-    before = None
-    for training in trainings(spec, root, key):
-        if start := start_of(training, before):
-            _train(training, start, on_progress)
-        before = training.path
-    return {}
+    stages = {key: trainings(spec, root, key) for key in keys}
+    lost: dict[Key, Exception] = {}
+    for number in range(len(spec.stages)):
+        fresh: dict[Key, Member] = {}
+        resumed: dict[Key, Member] = {}
+        for key in keys:
+            before = stages[key][number - 1].path if number else None
+            one = stages[key][number]
+            if key in lost or (start := start_of(one, before)) is None:
+                continue
+            group = resumed if start.resume else fresh
+            group[key] = Member(one.setup, one.path, start)
+        for group in (resumed, fresh):
+            lost |= _train(group, on_progress)
+    return lost
 
 
-def _train(training: Training, start: Start, on_progress: OnProgress) -> None:
-    """Trains one run."""
-    setup = training.setup
-    env = make_env(setup, setup.train.num_envs, setup.train.backend)
-    train(
-        env,
-        setup,
-        training.path,
-        start=start,
-        identity=identity(env),
-        on_progress=on_progress,
+def _train(
+    group: Mapping[Key, Member], on_progress: OnProgress
+) -> dict[Key, Exception]:
+    """Trains one stage of members as one program; returns those that diverged."""
+    if not group:
+        return {}
+    setup = next(iter(group.values())).setup
+    env = make_env(setup, len(group) * setup.train.num_envs, setup.train.backend)
+    results = train_population(
+        env, list(group.values()), identity=identity(env), on_progress=on_progress
     )
+    pairs = zip(group, results, strict=True)
+    return {key: one.diverged for key, one in pairs if one.diverged is not None}
 
 
 def start_of(training: Training, before: Path | None) -> Start | None:

@@ -119,7 +119,7 @@ def _finish(book: Book, engine: Engine, stop: StopSignals) -> None:
         while not running.stopping and len(running.jobs) < engine.slots:
             if not (waiting := book.waiting()):
                 break
-            group = engine.choose(waiting)
+            group = engine.choose(waiting, book.failures)
             book.started(group)
             running.jobs.append((group, engine.launch(group)))
         if not running.jobs:

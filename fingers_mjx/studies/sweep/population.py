@@ -1,0 +1,81 @@
+"""The engine `population`: many members as one program of one process."""
+
+import json
+import subprocess
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+from fingers_mjx.runs import checkpoint
+from fingers_mjx.studies.sweep.engine import Engine, Failures, worker_engine
+from fingers_mjx.studies.sweep.plan import Key, Training, trainings
+from fingers_mjx.studies.sweep.process import WORKER
+from fingers_mjx.studies.sweep.spec import Sweep
+from fingers_mjx.training.population import program
+
+WORLDS_PER_GIB = 256
+"""Worlds for each GiB of a GPU's memory: an H200 of 139 GiB trains 8 × 4,096 (ours)."""
+WORLDS_ON_CPU = 4096
+"""Most worlds of a program on the CPU, which gains nothing by more (ours)."""
+
+
+def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engine:
+    """Returns the engine that trains members together that can share a program.
+
+    Together are members that differ only in what a population leaves to each
+    (`fingers_mjx.training.population`) and have come equally far; as many as
+    `worlds_at_once` allows, and half of that for members that failed: so that memory
+    that was too small for them all suffices, and what one does to the program does not
+    befall all of them again.
+
+    Args:
+        spec: resolved; without `processes` there is one program at a time.
+        root: directory of the sweep, absolute.
+        command: of a worker.
+    """
+    most = spec.worlds_at_once or machine_worlds(spec.backend)
+    known: dict[Key, str] = {}
+
+    def choose(waiting: Sequence[Key], failures: Failures) -> tuple[Key, ...]:
+        first = waiting[0]
+        for key in waiting:
+            if key not in known:
+                known[key] = _shared(trainings(spec, root, key))
+        alike = [
+            key
+            for key in waiting
+            if (known[key], failures(key), _reached(spec, root, key))
+            == (known[first], failures(first), _reached(spec, root, first))
+        ]
+        worlds = trainings(spec, root, first)[0].setup.train.num_envs
+        return tuple(alike[: max(1, (most >> failures(first)) // worlds)])
+
+    return worker_engine(spec, root, command, spec.processes or 1, choose)
+
+
+def machine_worlds(backend: str | None) -> int:
+    """Returns how many worlds one program of this machine has room for.
+
+    Args:
+        backend: physics backend.
+    """
+    if backend != "warp":
+        return WORLDS_ON_CPU
+    query = ["nvidia-smi", "--query-gpu=memory.total", "--format=csv,noheader,nounits"]
+    with suppress(OSError, subprocess.SubprocessError, ValueError, IndexError):
+        done = subprocess.run(query, capture_output=True, text=True, check=True)
+        return int(int(done.stdout.split()[0]) / 1024 * WORLDS_PER_GIB)
+    return WORLDS_ON_CPU
+
+
+def _shared(stages: Sequence[Training]) -> str:
+    """Returns what a member shares with the others of its program, as text."""
+    shared = [[one.path.name, program(one.setup)] for one in stages]
+    return json.dumps(shared, sort_keys=True)
+
+
+def _reached(spec: Sweep, root: Path, key: Key) -> list[int]:
+    """Returns the iterations that each stage of a member has saved."""
+    home = key.directory(root)
+    found = [checkpoint.checkpoints(home / s.name / "checkpoints") for s in spec.stages]
+    return [int(saved[-1].name) if saved else -1 for saved in found]

@@ -1,0 +1,101 @@
+"""The engine `population`: who shares a program, and how many."""
+
+from support.sweep_setup import plan_faults, run_fake, states, sweep
+
+from fingers_mjx.studies.sweep import population as engine
+from fingers_mjx.studies.sweep.plan import Key, keys
+from fingers_mjx.studies.sweep.population import machine_worlds, population
+from fingers_mjx.studies.sweep.resolve import keep_sweep
+
+CONFIGURATIONS = {
+    "plain": {},
+    "costly": {"ppo.entropy_cost": 0.1, "env.curriculum_scale": 0.5},
+    "heavy": {"env.weights.lift": 5.0},
+    "wide": {"ppo.actor_layers": [16]},
+    "long": {"env.episode_s": 2.0},
+}
+
+
+def chosen(root, failures=lambda key: 0, **changes):
+    """Returns the groups of all members, in turn."""
+    changes = {"configurations": CONFIGURATIONS, "engine": "population"} | changes
+    root.mkdir(exist_ok=True)
+    spec = keep_sweep(sweep(**changes), root / "spec.yaml", root)
+    made, waiting, groups = population(spec, root), keys(spec), []
+    while waiting:
+        groups.append(made.choose(waiting, failures))
+        waiting = [key for key in waiting if key not in groups[-1]]
+    return groups
+
+
+def names(group):
+    return sorted({key.configuration for key in group})
+
+
+def test_a_program_has_members_that_differ_in_numbers_alone(tmp_path):
+    groups = chosen(tmp_path)
+    assert [names(group) for group in groups] == [
+        ["costly", "heavy", "plain"],
+        ["wide"],
+        ["long"],
+    ]
+    assert [len(group) for group in groups] == [6, 2, 2]
+
+
+def test_a_program_has_as_many_worlds_as_fit(tmp_path):
+    groups = chosen(tmp_path, configurations={"plain": {}}, seeds=5, worlds_at_once=16)
+    assert [len(group) for group in groups] == [2, 2, 1]
+    alone = chosen(tmp_path, configurations={"plain": {}}, seeds=5, worlds_at_once=1)
+    assert [len(group) for group in alone] == [1] * 5
+
+
+def test_members_that_failed_come_in_smaller_programs(tmp_path):
+    failed = {Key("plain", seed): 1 for seed in range(4)}
+    groups = chosen(
+        tmp_path,
+        lambda key: failed.get(key, 0),
+        configurations={"plain": {}},
+        seeds=8,
+        worlds_at_once=32,
+    )
+    assert [len(group) for group in groups] == [2, 2, 4]
+
+
+def test_members_that_have_come_equally_far_go_on_together(tmp_path):
+    changes = {"configurations": {"plain": {}}, "seeds": 4, "engine": "population"}
+    spec = keep_sweep(sweep(**changes), tmp_path / "spec.yaml", tmp_path)
+    for seed, saved in ((0, "00000002"), (2, "00000002"), (3, "00000001")):
+        place = Key("plain", seed).directory(tmp_path) / "train/checkpoints"
+        (place / saved).mkdir(parents=True)
+    made = population(spec, tmp_path)
+    assert [key.seed for key in made.choose(keys(spec), lambda key: 0)] == [0, 2]
+
+
+def test_faults_in_one_program_are_each_members_own(tmp_path):
+    """A worker of several members: who diverged, who is done, and one log."""
+    plan_faults(tmp_path, {"lift/0": ["nan"], "plain/1": ["killed"]})
+    manifest = run_fake(tmp_path, population, engine="population")
+    assert states(manifest) == {
+        "plain/0": "done",
+        "lift/0": "diverged",
+        "plain/1": "done",
+        "lift/1": "done",
+    }
+    log = (tmp_path / "runs/lift/1/log.txt").read_text("utf-8")
+    assert log.splitlines()[0] == "in one program with plain/0, whose log has the lines"
+
+
+def test_the_memory_of_a_gpu_bounds_its_worlds(monkeypatch):
+    assert machine_worlds("cpu") == engine.WORLDS_ON_CPU
+
+    class Done:
+        stdout = "143771\n143771\n"
+
+    monkeypatch.setattr(engine.subprocess, "run", lambda *words, **how: Done)
+    assert 8 * 4096 <= machine_worlds("warp") < 10 * 4096
+
+    def missing(*words, **how):
+        raise FileNotFoundError("nvidia-smi")
+
+    monkeypatch.setattr(engine.subprocess, "run", missing)
+    assert machine_worlds("warp") == engine.WORLDS_ON_CPU
