@@ -50,8 +50,9 @@ def ray_cluster(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Eng
 
     def launch(keys: Sequence[Key]) -> RayJob:
         words, log = worker_words(command, root, keys)
-        environment = worker_environment(threads, spec.backend)
-        return RayJob(ray, remote.remote(words, log, environment, threads), log)
+        environment = worker_environment(spec.threads, spec.backend)
+        actor = remote.remote(words, log, environment, spec.threads)
+        return RayJob(ray, actor, log)
 
     slots = spec.processes or _slots(ray.cluster_resources(), threads, gpus)
     return Engine(slots, one_by_one, launch, ray.shutdown)

@@ -54,6 +54,7 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
 
     backend = spec.backend or backend
     engine = spec.engine or ("population" if backend == "warp" else "local")
+    all_cores = engine == "population" or backend == "warp"
     evaluate = spec.evaluate
     made = dataclasses.replace(
         spec,
@@ -69,7 +70,7 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
         seeds=seed_list(spec.seeds),
         evaluate=dataclasses.replace(evaluate, backend=evaluate.backend or backend),
         engine=engine,
-        threads=spec.threads or (None if engine == "population" else 1),
+        threads=spec.threads or (None if all_cores else 1),
     )
     return made, hands
 

@@ -99,8 +99,8 @@ class Sweep:
         stages: trainings in turn, each warm-started from the one before.
         evaluate: how members are evaluated.
         promote: which configurations get more seeds.
-        threads: of XLA in each process, on which its last bits depend; with the engine
-            population as many as there are cores if not given, else 1.
+        threads: of XLA in each process, on which its last bits depend; if not given,
+            one, or all cores with the engine population and with backend warp.
         engine: where members are trained; by the backend if not given.
         processes: members (or programs) at the same time; by the machine if not given.
         address: of a Ray cluster; a cluster of its own on loopback if not given.

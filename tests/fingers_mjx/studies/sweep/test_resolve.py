@@ -43,6 +43,8 @@ def test_what_is_kept_reads_back_and_resolves_to_itself(tmp_path, source):
 
 def test_defaults_go_by_the_backend(source):
     spec = sweep(preset=None, backend=None, engine=None, configurations={})
+    ray, _ = resolved(dataclasses.replace(spec, engine="ray"), source, "warp")
+    assert (ray.preset, ray.engine, ray.threads) == ("fast", "ray", None)
     cpu, _ = resolved(spec, source, "cpu")
     gpu, _ = resolved(spec, source, "warp")
     assert (cpu.preset, cpu.engine, cpu.threads) == ("cpu", "local", 1)
