@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -14,12 +15,20 @@ from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
     from fingers_mjx.policy.source import PolicySource
+    from fingers_mjx.studies.transfer import Evaluated
 
 NAMES: tuple[str, str] = ("default", "extended")
 
+SEEDS = 3
+"""Trainings on each hand, unless said otherwise."""
+
 _NOTE = (
-    "gain of drift_deg_s and sideways_mps: change of their size; intervals are over "
-    "worlds, for this pair of trainings"
+    "gain: extended less default, mean over the seeds, of drifts of their size; "
+    "p, Holm is corrected for all rows"
+)
+_OVER_WORLDS = (
+    "another seed may turn each row around; over_worlds in transfer.json has intervals "
+    "for these two policies, and for no other trainings"
 )
 
 
@@ -30,20 +39,29 @@ def add(actions) -> None:
         "transfer",
         run,
         "measure what modelling an effect gains",
-        "Trains one policy on the default hand and one on the extended hand with equal "
-        "budget, then lets both walk in the simulator of the real hand: task speed, "
-        "drift, survival. Writes OUT/transfer.json beside both runs.",
+        "Trains policies on the default hand and on the extended hand with equal seeds "
+        "and budget, then lets all walk in the simulator of the real hand: task speed, "
+        "drift, survival. Writes OUT/transfer.json beside the runs. The same command "
+        "goes on with what is not trained yet.",
     )
     what = "hand.yaml of the simulator that stands for the real hand"
     options.path(parser, "--real", required=True, help=what)
     options.path(parser, "--extended", help="hand.yaml of a diagnosis")
     options.path(parser, "--default", help="default: the paper's hand")
-    options.path(
-        parser,
+    parser.add_argument(
         "--policies",
+        type=Path,
         nargs=2,
-        metavar="POLICY",
-        help="compare these, run directories or bundles, instead of training",
+        action="append",
+        metavar=("DEFAULT", "EXTENDED"),
+        help="compare these, run directories or bundles, instead of training; again "
+        "for each further pair",
+    )
+    parser.add_argument(
+        "--seeds",
+        type=options.whole(1),
+        metavar="N",
+        help=f"trainings on each hand, with the seeds from --seed on (default {SEEDS})",
     )
     parser.add_argument("--task", metavar="TASK", default="crawl", help="default crawl")
     parser.add_argument("--preset", metavar="NAME", help="as in fingers train")
@@ -71,32 +89,44 @@ def run(args: argparse.Namespace) -> int:
         found = "both" if args.policies else "neither"
         valid = "hands to train on (--extended) or trained policies (--policies)"
         raise InputError("transfer", "", found, valid)
+    if args.policies and args.seeds is not None:
+        valid = "none with --policies: every pair is a seed"
+        raise InputError("--seeds", "", args.seeds, valid)
     real = load_hand_file(args.real)
-    loaded = map(load_source, args.policies or _trained(args))
-    sources: dict[str, PolicySource] = dict(zip(NAMES, loaded, strict=True))
-    _check_alike(sources)
-    found = {}
-    for name, source in sources.items():
-        print(f"{name} policy in the real hand", file=sys.stderr)
-        found[name] = in_real_hand(
-            source, real, args.episodes, args.seed, backend, args.steps
-        )
+    pairs = args.policies or _trained(args)
+    sources: dict[str, list[PolicySource]] = {
+        name: [load_source(pair[arm]) for pair in pairs]
+        for arm, name in enumerate(NAMES)
+    }
+    _check_alike([source for arm in sources.values() for source in arm])
+    seeds = range(len(pairs)) if args.policies else _seeds(args)
+    found: dict[str, list[Evaluated]] = {name: [] for name in NAMES}
+    for name, arm in sources.items():
+        for seed, source in zip(seeds, arm, strict=True):
+            print(f"{name} policy {seed} in the real hand", file=sys.stderr)
+            how = (real, args.episodes, args.seed, backend, args.steps)
+            found[name].append(in_real_hand(source, *how))
     conditions = {
         "backend": backend,
         "episodes": args.episodes,
         "steps": args.steps,
         "real_sha256": real.sha256,
     }
-    document = compared(sources, found, args.seed, conditions)
+    document = compared(sources, found, seeds, args.seed, conditions)
     args.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2, allow_nan=False)
     write_atomic(args.out / "transfer.json", text)
-    print("\n".join(_lines(document)))
+    _show(document)
     return 0
 
 
-def _trained(args: argparse.Namespace) -> list[Path]:
-    """Trains both, with the same settings and the same seed."""
+def _seeds(args: argparse.Namespace) -> range:
+    """Seeds of the trainings."""
+    return range(args.seed, args.seed + (args.seeds or SEEDS))
+
+
+def _trained(args: argparse.Namespace) -> list[list[Path]]:
+    """Trains what is not trained yet; returns the two runs of each seed."""
     from envs.hand.hand_file import load_hand_file
     from fingers_mjx.runs.setup import new_setup, overridden
     from fingers_mjx.studies.transfer import train_on
@@ -108,35 +138,58 @@ def _trained(args: argparse.Namespace) -> list[Path]:
     if hands["default"].sha256 == hands["extended"].sha256:
         valid = "another hand than the default one"
         raise InputError("--extended", "", "the same hand", valid)
-    paths = [args.out / name for name in hands]
+    pairs = [[args.out / name / str(seed) for name in hands] for seed in _seeds(args)]
     with reporter(sys.stdout) as show:
-        for path, (name, hand) in zip(paths, hands.items(), strict=True):
-            show({"event": "note", "text": f"training on the {name} hand"})
-            train_on(setup, hand, path, args.warm_start, show)
-    return paths
+        for seed, paths in zip(_seeds(args), pairs, strict=True):
+            own = dataclasses.replace(setup.train, seed=seed)
+            own = dataclasses.replace(setup, train=own)
+            for path, (name, hand) in zip(paths, hands.items(), strict=True):
+                text = f"training on the {name} hand, seed {seed}"
+                show({"event": "note", "text": text})
+                train_on(own, hand, path, args.warm_start, show)
+    return pairs
 
 
-def _check_alike(sources: dict[str, PolicySource]) -> None:
+def _check_alike(sources: list[PolicySource]) -> None:
     """Refuses to compare policies of different tasks or with different budgets."""
-    first, second = sources.values()
-    for what, a, b in (
-        ("task", first.setup.train.task, second.setup.train.task),
-        ("steps of training", first.steps_trained, second.steps_trained),
-    ):
-        if a != b:
-            raise InputError(second.path, what, b, f"{a}, as the first policy")
+    first = sources[0]
+    for other in sources[1:]:
+        for what, a, b in (
+            ("task", first.setup.train.task, other.setup.train.task),
+            ("steps of training", first.steps_trained, other.steps_trained),
+        ):
+            if a != b:
+                raise InputError(other.path, what, b, f"{a}, as the first policy")
 
 
-def _lines(document: dict[str, Any]) -> list[str]:
-    """The comparison as text."""
-    lines = [f"{'':24}{'default':>12}{'extended':>12}{'gain':>12}  95 % interval"]
+def _show(document: dict[str, Any]) -> None:
+    """Prints the comparison."""
+    from fingers_mjx.cli.output import print_table
+    from fingers_mjx.studies.comparison.tables import ARROWS, interval, short
+    from fingers_mjx.studies.statistics.compare import ONE_SEED
+
+    header = ("measure", *NAMES, "gain", "95 % interval", "in favour", "p, Holm",
+              "detectable")  # fmt: skip
+    rows = []
     for name, gain in document["gain"].items():
-        means = [document["policies"][n]["measures"][name]["mean"] for n in NAMES]
-        shown = [_text(x) for x in (*means, gain["mean"])]
-        bounds = f"{_text(gain['low']).strip()} to {_text(gain['high']).strip()}"
-        lines.append(f"{name:24}{''.join(shown)}  {bounds}")
-    return [*lines, _NOTE]
+        numbers = (*(_mean(gain["values"][arm]) for arm in NAMES), gain["mean"])
+        favour = "–" if gain["in_favour"] is None else gain["in_favour"]
+        rows.append(
+            (
+                f"{name} {ARROWS[gain['better']]}",
+                *map(short, numbers),
+                interval(gain["low"], gain["high"]),
+                f"{favour} of {gain['n']}",
+                short(gain["p_holm"]),
+                short(gain["detectable"]),
+            )
+        )
+    seeds = len(document["seeds"])
+    print_table(f"in the real hand; trainings on each: {seeds}", header, rows)
+    print(_NOTE if seeds > 1 else f"{ONE_SEED}: {_OVER_WORLDS}")
 
 
-def _text(value: float | None) -> str:
-    return f"{'-' if value is None else format(value, '.4g'):>12}"
+def _mean(values: list[float | None]) -> float | None:
+    """Mean of an arm over its policies; None if one does not define the measure."""
+    known = [value for value in values if value is not None]
+    return sum(known) / len(known) if len(known) == len(values) else None

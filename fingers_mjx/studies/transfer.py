@@ -1,7 +1,8 @@
-"""What knowing an effect gains: two policies with equal budget in the real hand.
+"""What knowing an effect gains: policies of two hands, equal budget, in the real one.
 
-One is trained on the default hand, one on the hand that identification extended. Both
-then walk in the simulator that carries the effect, in the same worlds.
+Some are trained on the default hand, as many with the same seeds on the hand that
+identification extended. All then walk in the simulator that carries the effect, in the
+same worlds.
 """
 
 import dataclasses
@@ -15,6 +16,7 @@ import numpy as np
 
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
+from fingers_mjx.evaluation.direction import better
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.source import (
@@ -26,15 +28,20 @@ from fingers_mjx.evaluation.source import (
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.runs.setup import (
-    Setup,
-    make_env,
-)
+from fingers_mjx.runs.setup import Setup, make_env
+from fingers_mjx.studies.comparison.comparison import Row, corrected
+from fingers_mjx.studies.statistics.compare import difference
+from fingers_mjx.studies.statistics.pairs import pair
+from fingers_mjx.studies.sweep.member import start_of
+from fingers_mjx.studies.sweep.plan import Training
 from fingers_mjx.training.progress import OnProgress
-from fingers_mjx.training.train import Result, Start, train
+from fingers_mjx.training.train import train
 
 MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")
 """Of episodes with the task's own commands."""
+
+BY_SIZE = ("drift_deg_s", "sideways_mps")
+"""Measures that are compared by their size, whatever their side."""
 
 STRAIGHT = (0.10, 0.0, 0.0)
 """Command of the episodes in which drift is measured: v_x, v_y [m/s], yaw [rad/s]."""
@@ -55,29 +62,28 @@ class Evaluated:
 
 def train_on(
     setup: Setup, hand: HandFile, path: Path, warm: Path | None, say: OnProgress
-) -> Result:
+) -> None:
     """Trains a policy with a hand; everything else, the seed too, is that of `setup`.
+
+    A training that was stopped goes on, one that is done is not repeated.
 
     Args:
         setup: settings of learner and task.
         hand: hand to train on.
-        path: new run directory.
+        path: run directory.
         warm: networks to start from; None for fresh ones.
         say: called with the events of the training.
 
     Raises:
-        InputError: settings or a hand with which there is no environment.
+        InputError: settings or a hand with which there is no environment, or others
+            than those of the training that was stopped.
     """
     setup = dataclasses.replace(setup, hand=hand)
+    start = start_of(Training(path, setup, keep_schedules=False), warm)
+    if start is None:
+        return
     env = make_env(setup, setup.train.num_envs, setup.train.backend)
-    return train(
-        env,
-        setup,
-        path,
-        start=Start(warm_start=warm),
-        identity=identity(env),
-        on_progress=say,
-    )
+    train(env, setup, path, start=start, identity=identity(env), on_progress=say)
 
 
 def in_real_hand(
@@ -139,42 +145,103 @@ def columns(found: Evaluated) -> dict[str, np.ndarray]:
 
 
 def compared(
-    sources: Mapping[str, PolicySource],
-    found: Mapping[str, Evaluated],
-    seed: int,
+    sources: Mapping[str, Sequence[PolicySource]],
+    found: Mapping[str, Sequence[Evaluated]],
+    seeds: Sequence[int],
+    evaluation_seed: int,
     conditions: Mapping[str, Any],
 ) -> dict[str, Any]:
     """Returns the comparison for JSON.
 
     Args:
-        sources: policies by name, `default` first.
+        sources: policies of each arm, one for each seed, `default` first.
         found: their evaluations.
-        seed: of the evaluation.
+        seeds: of the trainings, in the order of the policies.
+        evaluation_seed: of worlds and commands.
         conditions: what else it takes to repeat it.
+
+    Raises:
+        InputError: there are not two arms with one policy for each seed.
     """
-    names = list(sources)
-    if len(names) != 2:
-        raise InputError("compared", "sources", len(names), "two policies")
-    tables = {name: columns(found[name]) for name in names}
-    return {
-        "policies": {n: summary(s, tables[n], seed) for n, s in sources.items()},
-        "gain": _gains(tables, names),
+    if [len(arm) for arm in sources.values()] != [len(seeds)] * 2:
+        sizes = " and ".join(str(len(arm)) for arm in sources.values())
+        raise InputError("compared", "sources", sizes, "two arms with equal seeds")
+    tables = {name: [columns(one) for one in arm] for name, arm in found.items()}
+    task = next(iter(sources.values()))[0].setup.train.task
+    document = {
+        "seeds": list(seeds),
+        "policies": {
+            name: [
+                summary(source, table, evaluation_seed)
+                for source, table in zip(arm, tables[name], strict=True)
+            ]
+            for name, arm in sources.items()
+        },
+        "gain": _gains(tables, seeds, task),
         "conditions": dict(conditions),
     }
+    if len(seeds) == 1:
+        document["over_worlds"] = _over_worlds(*[arm[0] for arm in tables.values()])
+    return document
 
 
 def _gains(
-    tables: Mapping[str, Mapping[str, np.ndarray]], names: Sequence[str]
+    tables: Mapping[str, Sequence[Mapping[str, np.ndarray]]],
+    seeds: Sequence[int],
+    task: str,
+) -> dict[str, dict[str, Any]]:
+    """Second arm less first over seeds, and the values of both, for each measure."""
+    (_, ours), (_, other) = reversed(tables.items())
+    rows, values = [], {}
+    for name in other[0]:
+        pairs = pair(*(_values(name, arm, seeds) for arm in (ours, other)))
+        direction = better(task, name)
+        found = difference(pairs, direction)
+        rows.append(Row(list(tables)[1], name, direction, found, None))
+        values[name] = {
+            arm: [_known(x) for x in _values(name, policies, seeds).values()]
+            for arm, policies in tables.items()
+        }
+    return {
+        row.measure: {
+            **dataclasses.asdict(row.difference),
+            "better": row.better,
+            "p_holm": row.p_holm,
+            "values": values[row.measure],
+        }
+        for row in corrected(rows)
+    }
+
+
+def _values(
+    name: str, policies: Sequence[Mapping[str, np.ndarray]], seeds: Sequence[int]
+) -> dict[int, float]:
+    """Mean over the episodes of each policy that define a measure; else NaN."""
+    found = {}
+    for seed, table in zip(seeds, policies, strict=True):
+        defined = _size(name, table[name])[np.isfinite(table[name])]
+        found[seed] = float(defined.mean()) if len(defined) else np.nan
+    return found
+
+
+def _size(name: str, values: np.ndarray) -> np.ndarray:
+    return np.abs(values) if name in BY_SIZE else values
+
+
+def _known(value: float) -> float | None:
+    return value if np.isfinite(value) else None
+
+
+def _over_worlds(
+    before: Mapping[str, np.ndarray], after: Mapping[str, np.ndarray]
 ) -> dict[str, dict[str, float | None]]:
     """Second policy less the first, world by world; drift by its size.
 
     Intervals are over worlds, for these two trainings: other seeds, other policies.
     """
-    before, after = (tables[name] for name in names)
     found = {}
     for name in before:
-        size = np.abs if name in ("drift_deg_s", "sideways_mps") else np.asarray
-        one = paired_difference(size(after[name]), size(before[name]))
+        one = paired_difference(_size(name, after[name]), _size(name, before[name]))
         values = {"mean": one.mean, "low": one.low, "high": one.high, "n": one.n}
-        found[name] = {k: v if np.isfinite(v) else None for k, v in values.items()}
+        found[name] = {k: _known(v) for k, v in values.items()}
     return found

@@ -1,5 +1,6 @@
 """Configurations against a baseline: all differences, corrected together."""
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -123,7 +124,6 @@ def compared(
         raise InputError("--baseline", "", "no other", "a sweep of two configurations")
     chosen = _chosen(results, measures)
     rows = [_row(results, name, baseline, m) for m in chosen for name in others]
-    corrected = holm(np.array([_number(found.p) for _, _, found in rows]))
     return Comparison(
         results=results,
         baseline=baseline,
@@ -131,11 +131,26 @@ def compared(
         cells=tuple(
             _cell(results, n, m) for m in chosen for n in results.configurations
         ),
-        rows=tuple(
-            Row(name, measure, better(results.task, measure), found, _known(p))
-            for (name, measure, found), p in zip(rows, corrected, strict=True)
-        ),
+        rows=tuple(corrected(rows)),
     )
+
+
+def corrected(rows: Sequence[Row]) -> list[Row]:
+    """Returns rows with p̃ = Holm(p) over all of them [1].
+
+    Args:
+        rows: that are read together.
+
+    Source:
+        `holm`.
+    """
+    found = [row.difference.p for row in rows]
+    known = [math.nan if p is None else p for p in found]
+    together = holm(np.array(known, float))
+    return [
+        dataclasses.replace(row, p_holm=_known(p))
+        for row, p in zip(rows, together, strict=True)
+    ]
 
 
 def _chosen(results: Results, measures: Sequence[str] | None) -> tuple[str, ...]:
@@ -153,21 +168,17 @@ def _chosen(results: Results, measures: Sequence[str] | None) -> tuple[str, ...]
     return directed
 
 
-def _row(
-    results: Results, name: str, baseline: str, measure: str
-) -> tuple[str, str, Difference]:
+def _row(results: Results, name: str, baseline: str, measure: str) -> Row:
+    """One row, not corrected yet."""
     arms = [results.values.get(n, {}).get(measure, {}) for n in (name, baseline)]
-    return name, measure, difference(pair(*arms), better(results.task, measure))
+    direction = better(results.task, measure)
+    return Row(name, measure, direction, difference(pair(*arms), direction), None)
 
 
 def _cell(results: Results, name: str, measure: str) -> Cell:
     values = results.values.get(name, {}).get(measure, {})
     kept = {seed: _known(value) for seed, value in sorted(values.items())}
     return Cell(name, measure, kept, arm(np.array(list(values.values()), float)))
-
-
-def _number(value: float | None) -> float:
-    return math.nan if value is None else value
 
 
 def _known(value: float) -> float | None:

@@ -4,10 +4,12 @@ from collections.abc import Mapping, Sequence
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from fingers_mjx.reports.figures import INK, LINES, panels_of
-from fingers_mjx.studies.comparison.comparison import Cell, Comparison
+from fingers_mjx.studies.comparison.comparison import Comparison
 from fingers_mjx.studies.comparison.curves import STEPS, Curve, band
+from fingers_mjx.studies.statistics.compare import Arm, Difference
 
 ACROSS = 3
 """Panels side by side."""
@@ -23,42 +25,77 @@ def seed_dots(comparison: Comparison) -> Figure:
         comparison: of a sweep.
     """
     names = comparison.results.configurations
+    figure, panels = _panels(comparison, names)
     colours = _colours(names, comparison.baseline)
-    rows = -(-len(comparison.measures) // ACROSS)
-    across = min(ACROSS, len(comparison.measures))
-    size = (1.6 + 2.7 * across, rows * (0.8 + 0.34 * len(names)))
-    figure, panels = panels_of(rows * across, size, rows, shared=False)
-    for axes in panels[len(comparison.measures) :]:
-        axes.set_visible(False)
-    for index, measure in enumerate(comparison.measures):
-        axes = panels[index]
+    for measure, axes in panels.items():
         for place, name in enumerate(names):
-            _dots(axes, place, comparison.cell(name, measure), colours[name])
-        labels = names if index % across == 0 else [""] * len(names)
-        axes.set_yticks(range(len(names)), labels)
-        axes.set(ylim=(len(names) - 0.4, -0.6), xlabel=measure)
-        axes.margins(x=0.08)
-        axes.grid(visible=False, axis="y")
+            cell = comparison.cell(name, measure)
+            seeds = [value for value in cell.values.values() if value is not None]
+            _dots(axes, place, seeds, cell.arm, colours[name])
     return figure
 
 
-def _dots(axes: Axes, place: int, cell: Cell, colour: str) -> None:
+def difference_dots(comparison: Comparison) -> Figure:
+    """Draws the difference from the baseline on every seed, its mean and interval.
+
+    Args:
+        comparison: of a sweep.
+    """
+    names = list(dict.fromkeys(row.configuration for row in comparison.rows))
+    figure, panels = _panels(comparison, names)
+    colours = _colours(comparison.results.configurations, comparison.baseline)
+    for axes in panels.values():
+        axes.plot([0.0, 0.0], [-1, len(names)], color=INK, lw=1.0, ls="--")
+    for row in comparison.rows:
+        ours, base = (
+            comparison.cell(name, row.measure).values
+            for name in (row.configuration, comparison.baseline)
+        )
+        both = [(ours[seed], base[seed]) for seed in ours.keys() & base.keys()]
+        seeds = [x - y for x, y in both if x is not None and y is not None]
+        where = (panels[row.measure], names.index(row.configuration), seeds)
+        _dots(*where, row.difference, colours[row.configuration])
+    return figure
+
+
+def _panels(
+    comparison: Comparison, names: Sequence[str]
+) -> tuple[Figure, dict[str, Axes]]:
+    """One panel for each measure, with a row for each configuration."""
+    count = len(comparison.measures)
+    across, rows = min(ACROSS, count), -(-count // ACROSS)
+    size = (1.6 + 2.7 * across, rows * (0.8 + 0.34 * len(names)))
+    figure, panels = panels_of(rows * across, size, rows, shared=False)
+    for axes in panels[count:]:
+        axes.set_visible(False)
+    found = dict(zip(comparison.measures, panels, strict=False))
+    for index, (measure, axes) in enumerate(found.items()):
+        labels = names if index % across == 0 else [""] * len(names)
+        axes.set_yticks(range(len(names)), labels)
+        axes.set(ylim=(len(names) - 0.4, -0.6), xlabel=measure)
+        axes.xaxis.set_major_locator(MaxNLocator(4))
+        axes.margins(x=0.08)
+        axes.grid(visible=False, axis="y")
+    return figure, found
+
+
+def _dots(
+    axes: Axes, place: int, seeds: Sequence[float], of: Arm | Difference, colour: str
+) -> None:
     """One configuration: seeds above, mean and interval below."""
-    seeds = [value for value in cell.values.values() if value is not None]
-    heights = [place - 0.16] * len(seeds)
-    axes.plot(seeds, heights, "o", color=colour, alpha=0.6, ms=4.5, mew=0)
-    if cell.arm.mean is None:
-        return
-    if cell.arm.low is not None and cell.arm.high is not None:
-        ends = [cell.arm.low, cell.arm.high]
-        axes.plot(ends, [place + 0.16] * 2, color=colour, lw=2.2)
-    axes.plot(cell.arm.mean, place + 0.16, "D", color=colour, ms=5, mec="white")
+    above, below = place - 0.16, place + 0.16
+    axes.plot(seeds, [above] * len(seeds), "o", color=colour, alpha=0.6, ms=4.5, mew=0)
+    if of.low is not None and of.high is not None:
+        axes.plot([of.low, of.high], [below] * 2, color=colour, lw=2.2)
+    if of.mean is not None:
+        axes.plot(of.mean, below, "D", color=colour, ms=5, mec="white")
 
 
-def learning_curves(curves: Sequence[Curve], comparison: Comparison) -> Figure:
+def learning_curves(curves: Sequence[Curve], comparison: Comparison) -> Figure | None:
     """Draws mean and band over seeds of each configuration, and every seed thinly.
 
-    Members that did not finish are dotted and not in the mean.
+    Members that did not finish are dotted and not in the mean. None if no curve has
+    anything that is drawn.
 
     Args:
         curves: of the members.
@@ -66,12 +103,15 @@ def learning_curves(curves: Sequence[Curve], comparison: Comparison) -> Figure:
     """
     names = comparison.results.configurations
     colours = _colours(names, comparison.baseline)
-    figure, panels = panels_of(len(SHOWN), (9.6, 3.4), 1)
-    for axes, (metric, label) in zip(panels, SHOWN.items(), strict=True):
+    found = [m for m in SHOWN if any(len(curve.of(m)[0]) for curve in curves)]
+    if not found:
+        return None
+    figure, panels = panels_of(len(found), (4.8 * len(found), 3.4))
+    for axes, metric in zip(panels, found, strict=True):
         for name in names:
             own = [c for c in curves if c.configuration == name]
             _curve(axes, own, metric, colours[name])
-        axes.set(xlabel=f"control steps ({STEPS})", ylabel=label)
+        axes.set(xlabel=f"control steps ({STEPS})", ylabel=SHOWN[metric])
     for name in names:
         panels[0].plot([], [], color=colours[name], lw=1.8, label=name)
     handles, labels = panels[0].get_legend_handles_labels()

@@ -14,7 +14,11 @@ from fingers_mjx.reports.page import (
 )
 from fingers_mjx.studies.comparison.comparison import Comparison
 from fingers_mjx.studies.comparison.curves import Curve
-from fingers_mjx.studies.comparison.figures import learning_curves, seed_dots
+from fingers_mjx.studies.comparison.figures import (
+    difference_dots,
+    learning_curves,
+    seed_dots,
+)
 from fingers_mjx.studies.comparison.tables import (
     HEADER,
     arm_rows,
@@ -61,10 +65,17 @@ def write_page(
         Note("\n".join(notes(comparison))),
         Table(HEADER, difference_rows(comparison), f"Against {baseline}."),
     ]
-    caption = "Dots: seeds. Below them their mean and its 95 % interval."
+    dots = "Dots: seeds. Below them their mean and its 95 % interval."
+    paired = f"The same of the differences from {baseline} on equal seeds."
     sections = [
         Section("Differences", differences),
-        Section("Seeds", [picture(seed_dots(comparison), caption)]),
+        Section(
+            "Seeds",
+            [
+                picture(seed_dots(comparison), dots),
+                picture(difference_dots(comparison), paired),
+            ],
+        ),
         Section("Learning curves", _curves(comparison, curves)),
         Section("Configurations", _configurations(comparison)),
         Section("Missing", _missing(comparison)),
@@ -76,14 +87,15 @@ def write_page(
 
 
 def _curves(comparison: Comparison, curves: Sequence[Curve]) -> list[Block]:
-    if not curves:
+    figure = learning_curves(curves, comparison)
+    if figure is None:
         return [Note("No member has a learning curve.")]
     caption = (
         "Thin: seeds; dotted where the training is not done. Thick: mean over the "
         "seeds that are done, with its pointwise 95 % interval, as far as all of them "
         "have come. Returns of different rewards cannot be compared."
     )
-    return [picture(learning_curves(curves, comparison), caption)]
+    return [picture(figure, caption)]
 
 
 def _configurations(comparison: Comparison) -> list[Block]:

@@ -54,7 +54,7 @@ def _votes(found: Difference) -> str:
     if found.in_favour is None or found.against is None:
         return f"– of {found.n}".replace(" ", SPACE)
     equal = found.n - found.in_favour - found.against
-    more = f", {equal} equal" if equal else ""
+    more = f" ({equal} =)" if equal else ""
     return f"{found.in_favour} of {found.n}{more}".replace(" ", SPACE)
 
 

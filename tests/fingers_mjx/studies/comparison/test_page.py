@@ -3,7 +3,11 @@ from support.synthetic_sweep import study, write_sweep
 
 from fingers_mjx.studies.comparison.comparison import compared
 from fingers_mjx.studies.comparison.curves import read_curves
-from fingers_mjx.studies.comparison.figures import learning_curves, seed_dots
+from fingers_mjx.studies.comparison.figures import (
+    difference_dots,
+    learning_curves,
+    seed_dots,
+)
 from fingers_mjx.studies.comparison.page import write_page
 from fingers_mjx.studies.comparison.results import read_results
 from fingers_mjx.studies.sweep.manifest import read_manifest
@@ -20,7 +24,7 @@ def test_the_page_says_all_and_loads_nothing(tmp_path):
     text = write_page(
         tmp_path / "c.html", *made(path), ["fingers compare s"]
     ).read_text()
-    assert text.count("data:image/png;base64,") == 2
+    assert text.count("data:image/png;base64,") == 3
     assert "http" not in text and "<script" not in text and 'src="/' not in text
     words = ("comparisons read together", "out of &lt;memory&gt;", "lift/1", "Holm",
              "task_speed_mps\N{NO-BREAK SPACE}↑", "interquartile mean",
@@ -48,6 +52,12 @@ def test_figures_show_every_seed_and_mean(tmp_path):
     for name in ("base", "lift"):
         cell = comparison.cell(name, "task_speed_mps")
         assert set(cell.values.values()) | {cell.arm.mean} <= set(drawn)
+    (gain,) = [
+        ax.lines[1].get_xdata()
+        for ax in difference_dots(comparison).axes
+        if ax.get_xlabel() == "task_speed_mps"
+    ]
+    np.testing.assert_allclose(gain, 0.02)
     panel = learning_curves(curves, comparison).axes[0]
     assert len(panel.collections) == 2  # a band of each configuration
     assert len([line for line in panel.lines if len(line.get_xdata())]) == 2 * (4 + 1)
