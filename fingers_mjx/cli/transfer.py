@@ -100,19 +100,19 @@ def run(args: argparse.Namespace) -> int:
     }
     _check_alike([source for arm in sources.values() for source in arm])
     seeds = range(len(pairs)) if args.policies else _seeds(args)
-    found: dict[str, list[Evaluated]] = {name: [] for name in NAMES}
+    evaluated: dict[str, list[Evaluated]] = {name: [] for name in NAMES}
     for name, arm in sources.items():
         for seed, source in zip(seeds, arm, strict=True):
             print(f"{name} policy {seed} in the real hand", file=sys.stderr)
             how = (real, args.episodes, args.seed, backend, args.steps)
-            found[name].append(in_real_hand(source, *how))
+            evaluated[name].append(in_real_hand(source, *how))
     conditions = {
         "backend": backend,
         "episodes": args.episodes,
         "steps": args.steps,
         "real_sha256": real.sha256,
     }
-    document = compared(sources, found, seeds, args.seed, conditions)
+    document = compared(sources, evaluated, seeds, args.seed, conditions)
     args.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2, allow_nan=False)
     write_atomic(args.out / "transfer.json", text)

@@ -191,7 +191,7 @@ def _gains(
     task: str,
 ) -> dict[str, dict[str, Any]]:
     """Second arm less first over seeds, and the values of both, for each measure."""
-    (_, ours), (_, other) = reversed(tables.items())
+    other, ours = tables.values()
     rows, values = [], {}
     for name in other[0]:
         pairs = pair(*(_values(name, arm, seeds) for arm in (ours, other)))
