@@ -6,10 +6,11 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from envs.errors import InputError, one_of
+from fingers_mjx.evaluation.direction import BETTER, Better, better
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.studies.sweep.manifest import Manifest, Member
 from fingers_mjx.studies.sweep.plan import Key
-from fingers_mjx.studies.sweep.spec import Promotion, Sweep, seed_list
+from fingers_mjx.studies.sweep.spec import Sweep, seed_list
 
 
 def promoted(spec: Sweep, root: Path, manifest: Manifest) -> list[Key]:
@@ -34,17 +35,34 @@ def promoted(spec: Sweep, root: Path, manifest: Manifest) -> list[Key]:
         if member.state == "done" and member.seed in seeds:
             value = _measure(root, member, spec.promote.by)
             found.setdefault(member.configuration, []).append(value)
-    best = _best(found, spec.promote)
+    best = _best(found, spec.promote.top, check_promotion(spec, root))
     more = seed_list(spec.promote.seeds, max(seeds))
     return [Key(name, seed) for seed in more for name in best]
 
 
-def _best(found: Mapping[str, list[float]], promote: Promotion) -> list[str]:
+def check_promotion(spec: Sweep, source: Path) -> Better:
+    """Returns which direction of the measure is better, by which is promoted.
+
+    Raises:
+        InputError: it is neither known nor given.
+    """
+    promote = spec.promote
+    if promote is None:
+        return "higher"
+    found = promote.better or better(spec.task, promote.by)
+    if found is None:
+        known = BETTER.get(spec.task, {})
+        valid = f"{one_of(known, promote.by)}; or any measure with better: higher|lower"
+        raise InputError(source, "promote.by", promote.by, valid)
+    return found
+
+
+def _best(found: Mapping[str, list[float]], top: int, direction: Better) -> list[str]:
     """Returns the best configurations; those without a value are none of them."""
     means = {name: sum(x) / len(x) for name, x in found.items()}
     known = [name for name, mean in means.items() if math.isfinite(mean)]
-    sign = -1.0 if promote.best == "highest" else 1.0
-    return sorted(known, key=lambda name: sign * means[name])[: promote.top]
+    sign = -1.0 if direction == "higher" else 1.0
+    return sorted(known, key=lambda name: sign * means[name])[:top]
 
 
 def _measure(root: Path, member: Member, name: str) -> float:

@@ -18,6 +18,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml, load_hand_file
 from fingers_mjx.runs.directory import flat
 from fingers_mjx.studies.sweep.plan import check_sweep
+from fingers_mjx.studies.sweep.promote import check_promotion
 from fingers_mjx.studies.sweep.search import Overrides, gridded, sampled
 from fingers_mjx.studies.sweep.spec import Sweep, free_names, seed_list
 
@@ -118,6 +119,7 @@ def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
         (root / name).parent.mkdir(exist_ok=True)
         write_atomic(root / name, text)
     check_sweep(spec, root, source)
+    check_promotion(spec, source)
     write_atomic(root / SPEC_FILE, dump_yaml(spec))
     return spec
 

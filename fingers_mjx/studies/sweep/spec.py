@@ -7,6 +7,7 @@ from typing import Any, Literal
 
 from envs.config.typed import limits
 from envs.errors import InputError
+from fingers_mjx.evaluation.direction import Better
 from fingers_mjx.studies.sweep.search import Grid, Overrides, Search
 
 NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9._-]{0,63}")
@@ -72,13 +73,14 @@ class Promotion:
         top: number of configurations.
         seeds: a list, or how many; a number means so many seeds after the largest of
             the sweep. What chose the best says too much good of it; new seeds do not.
-        best: whether the highest or the lowest is the best.
+        better: whether higher or lower is; of measures whose direction is known
+            (`fingers_mjx.evaluation.direction`) that one, if not given.
     """
 
     by: str
     top: int = field(default=3, metadata=limits("1", 1, 2**20))
     seeds: Seeds = field(default=6, metadata=_SEEDS)
-    best: Literal["highest", "lowest"] = "highest"
+    better: Better | None = None
 
 
 @dataclass(frozen=True)

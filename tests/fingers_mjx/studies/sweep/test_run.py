@@ -110,13 +110,16 @@ def test_the_best_configurations_are_trained_on_more_seeds(tmp_path):
     assert set(states(manifest).values()) == {"done"}
     again = run_fake(tmp_path, promote=promote)
     assert again == manifest
-    lowest = run_fake(tmp_path, promote=promote | {"best": "lowest"})
+    lowest = run_fake(tmp_path, promote=promote | {"better": "lower"})
     assert states(lowest) == states(manifest) | {"plain/2": "done", "plain/3": "done"}
 
 
 def test_promotion_by_an_unknown_measure_is_refused(tmp_path):
     with pytest.raises(InputError, match="did you mean task_speed_mps"):
         run_fake(tmp_path, promote={"by": "task_speed"})
+    assert journal(tmp_path) == []
+    with pytest.raises(InputError, match="found path; valid: one of task_speed_mps"):
+        run_fake(tmp_path, promote={"by": "path", "better": "higher"})
 
 
 def test_promotion_waits_for_what_is_missing(tmp_path):
