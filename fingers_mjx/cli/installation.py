@@ -118,7 +118,7 @@ def check_requirement(text: str) -> None:
     """Raises if a requirement of ours is not met by what is installed.
 
     Args:
-        text: as in package metadata, such as "jax<0.10,>=0.8.1"; requirements of
+        text: as in package metadata, such as "jax<0.12,>=0.8.1"; requirements of
             extras are not looked at.
 
     Raises:
