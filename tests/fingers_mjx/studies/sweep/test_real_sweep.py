@@ -69,10 +69,15 @@ def workers(root):
 
 
 def kill_some(root, rng):
-    """Kills the parent or a worker at random moments, and starts the sweep again."""
+    """Kills the parent or a worker at random moments, and starts the sweep again.
+
+    Each time some worker has been at it for up to a minute.
+    """
     parent, killed = start(root), []
     while len(killed) < KILLS:
-        time.sleep(rng.uniform(5.0, 60.0))
+        while not workers(root) and parent.poll() is None:
+            time.sleep(0.5)
+        time.sleep(rng.uniform(0.0, 60.0))
         if parent.poll() is not None:
             break
         running = workers(root)
