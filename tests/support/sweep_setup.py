@@ -6,7 +6,6 @@ from pathlib import Path
 
 from support.sweep_worker import planned
 
-from envs.config.strict_yaml import write_yaml
 from envs.config.typed import from_dict
 from fingers_mjx.cli.main import main
 from fingers_mjx.studies.sweep.book import Book
@@ -78,7 +77,8 @@ def run_on_two_nodes(root, source=None):
         if source is None:
             run_fake(root, ray_cluster, **on)
         else:
-            text = source.read_text("utf-8") + write_yaml(on)
+            lines = [f"{name}: {value}\n" for name, value in on.items()]
+            text = "".join([source.read_text("utf-8"), *lines])
             there = source.with_name("ray.yaml")
             there.write_text(text, "utf-8")
             assert main(["sweep", str(there), "-o", str(root)]) == 0

@@ -73,7 +73,8 @@ def _found(root: Path) -> list[Standing]:
 
 
 def _whole(root: Path) -> Event:
-    return {"event": "sweep", "text": counts(_found(root))}
+    found = _found(root)
+    return {"event": "sweep", "text": counts(found) if found else "preparing"}
 
 
 def _row(member: Member) -> Event:

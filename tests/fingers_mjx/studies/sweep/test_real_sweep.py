@@ -137,3 +137,14 @@ def test_two_nodes_give_the_same_tables(tmp_path, undisturbed):
     subprocess.run(command, env=environment(), check=True)
     print(f"two nodes: {time.monotonic() - begun_s:.0f} s")
     assert_same_tables(undisturbed, root)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3600)
+def test_one_program_gives_the_same_tables(tmp_path, undisturbed):
+    spec, root = tmp_path / "spec.yaml", tmp_path / "sweep"
+    together = SPEC | {"engine": "population", "threads": 1}
+    spec.write_text(write_yaml(together), "utf-8")
+    command = [sys.executable, "-m", "fingers_mjx.cli.main", "sweep", str(spec)]
+    subprocess.run([*command, "-o", str(root)], env=environment(), check=True)
+    assert_same_tables(undisturbed, root)
