@@ -61,9 +61,9 @@ def run(args: argparse.Namespace) -> int:
     out: Path = args.out or args.sweep / "comparison"
     options.check_directory("--out", out)
     results = read_results(args.sweep, manifest)
-    comparison = compared(results, args.baseline, args.measures)
     if not args.allow_partial:
         check_complete(results, args.sweep)
+    comparison = compared(results, args.baseline, args.measures)
     write_comparison(out, comparison)
     curves = read_curves(args.sweep, manifest)
     write_page(out / PAGE_FILE, comparison, curves, [_command(args)])

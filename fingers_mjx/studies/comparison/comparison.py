@@ -122,6 +122,8 @@ def compared(
     others = [name for name in results.configurations if name != baseline]
     if not others:
         raise InputError("--baseline", "", "no other", "a sweep of two configurations")
+    if not results.values:
+        raise InputError("members", "", "none done", "at least one with an evaluation")
     chosen = _chosen(results, measures)
     rows = [_row(results, name, baseline, m) for m in chosen for name in others]
     return Comparison(
@@ -164,7 +166,7 @@ def _chosen(results: Results, measures: Sequence[str] | None) -> tuple[str, ...]
     directed = tuple(m for m in known if better(results.task, m))
     if not directed:
         found = f"no measure of {results.task} with a better direction"
-        raise InputError("--measures", "", found, one_of(known) if known else "results")
+        raise InputError("--measures", "", found, one_of(known))
     return directed
 
 

@@ -56,6 +56,11 @@ class Results:
     missing: tuple[Missing, ...]
     conditions: Mapping[str, Any]
 
+    def seeds(self, configuration: str) -> set[int]:
+        """Seeds that the sweep has of a configuration, done or not."""
+        lacking = {m.seed for m in self.missing if m.configuration == configuration}
+        return lacking | set(self.steps.get(configuration, {}))
+
     @property
     def members(self) -> int:
         """How many members the sweep has."""
@@ -100,10 +105,7 @@ def read_results(root: Path, manifest: Manifest) -> Results:
         _check_alike(root, first, (member, found))
         own = values.setdefault(member.configuration, {})
         for measure, value in found["measures"].items():
-            mean = value["mean"]
-            own.setdefault(measure, {})[member.seed] = (
-                math.nan if mean is None else mean
-            )
+            own.setdefault(measure, {})[member.seed] = value
         trained = steps.setdefault(member.configuration, {})
         trained[member.seed] = found["steps_trained"]
     shared = {key: first[1][key] for key in ALIKE} if first else {}
@@ -125,12 +127,18 @@ def _summary(root: Path, manifest: Manifest, member: Member) -> dict[str, Any] |
     run = member.key.directory(root) / manifest.stages[-1]
     try:
         found = json.loads((run / "eval" / SUMMARY_FILE).read_text(encoding="utf-8"))
-        assert {*ALIKE, "measures", "steps_trained"} <= found.keys()
+        means = {k: _number(v["mean"]) for k, v in found["measures"].items()}
+        kept = {key: found[key] for key in (*ALIKE, "steps_trained")}
     except FileNotFoundError:
         return "done, but without an evaluation"
-    except (OSError, ValueError, AttributeError, AssertionError):
+    except (OSError, ValueError, AttributeError, TypeError, LookupError):
         return "done, but its evaluation cannot be read"
-    return found
+    return {**kept, "measures": means}
+
+
+def _number(value: float | None) -> float:
+    """The mean of a measure; NaN where no episode defines it."""
+    return math.nan if value is None else float(value)
 
 
 def _check_alike(

@@ -127,6 +127,7 @@ def _dropped(comparison: Comparison) -> list[str]:
         said.append(
             f"{text}: a mean over the trainings that worked is not one over all."
         )
+    said += _alone(comparison)
     undefined = [
         f"{cell.measure} of {cell.configuration}/{seed}"
         for cell in comparison.cells
@@ -138,9 +139,23 @@ def _dropped(comparison: Comparison) -> list[str]:
     return said
 
 
-def _listed(names: Sequence[str], most: int = 6) -> str:
+def _alone(comparison: Comparison) -> list[str]:
+    """Seeds that a sweep has of one arm and not of the other, such as after search."""
+    own = comparison.results.seeds(comparison.baseline)
+    alone = {
+        row.configuration: comparison.results.seeds(row.configuration) ^ own
+        for row in comparison.rows
+    }
+    listed = [f"{n} ({_listed(sorted(s))})" for n, s in alone.items() if s]
+    if not listed:
+        return []
+    text = f"Seeds that only {comparison.baseline} or only the other has are left out"
+    return [f"{text}: {_listed(listed)}."]
+
+
+def _listed(names: Sequence[object], most: int = 6) -> str:
     more = f" and {len(names) - most} more" if len(names) > most else ""
-    return ", ".join(names[:most]) + more
+    return ", ".join(map(str, names[:most])) + more
 
 
 def _capital(text: str) -> str:

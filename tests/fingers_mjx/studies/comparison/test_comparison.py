@@ -105,6 +105,24 @@ def test_unknown_names_are_refused_with_the_valid_ones(
         compared(results(tmp_path, study(GAINS)), baseline, measures)
 
 
+def test_seeds_of_one_arm_alone_are_named(tmp_path):
+    values = study(GAINS, 5)
+    values["lift"] |= {7: values["lift"][0], 8: values["lift"][1]}
+    del values["base"][4]
+    found = compared(results(tmp_path, values), "base", [SPEED])
+    lift, same = found.rows
+    assert (lift.difference.n, lift.difference.dropped) == (4, 3)
+    assert (same.difference.n, same.difference.dropped) == (4, 1)
+    assert "lift (4, 7, 8), same (4)" in "\n".join(notes(found))
+
+
+def test_nothing_done_is_not_compared(tmp_path):
+    states = {(name, 0): ("waiting", "") for name in ("base", "lift")}
+    whole = results(tmp_path, study({"lift": 0.02}, 1), states)
+    with pytest.raises(InputError, match="none done"):
+        compared(whole, "base")
+
+
 def test_one_configuration_cannot_be_compared(tmp_path):
     with pytest.raises(InputError, match="two configurations"):
         compared(results(tmp_path, study({})), "base")

@@ -34,14 +34,15 @@ def test_a_measure_that_nobody_defines_is_none(tmp_path):
 def test_a_member_that_is_not_done_is_missing_with_its_reason(tmp_path):
     states = {("lift", 1): ("failed", "out of memory"), ("base", 2): ("waiting", "")}
     path = write_sweep(tmp_path / "s", study({"lift": 0.02}, 3), states)
-    run = path / "runs" / "lift" / "0" / "walk" / "eval" / "summary.json"
-    run.write_text("{")
+    for seed, text in ((0, "{"), (2, '{"measures": {"survival": 1.0}}')):
+        file = path / "runs" / "lift" / str(seed) / "walk" / "eval" / "summary.json"
+        file.write_text(text)
     (path / "runs" / "base" / "0" / "walk" / "eval" / "summary.json").unlink()
     missing = {m.name: m.reason for m in read(path).missing}
-    assert set(missing) == {"lift/1", "base/2", "lift/0", "base/0"}
+    assert set(missing) == {"lift/0", "lift/1", "lift/2", "base/0", "base/2"}
     assert "failed in walk after 4 iterations: out of memory" in missing["lift/1"]
     assert missing["base/2"].startswith("waiting")
-    assert "cannot be read" in missing["lift/0"]
+    assert all("cannot be read" in missing[name] for name in ("lift/0", "lift/2"))
     assert "without an evaluation" in missing["base/0"]
 
 
