@@ -80,8 +80,10 @@ class Book:
         state = {"done": "done", "diverged": "diverged", "failed": "failed"}
         if found.verdict in state:
             self._change(member, state=state[found.verdict], reason=found.reason)
-        elif found.verdict == "full" or stopping:
+        elif found.verdict == "full":
             self._change(member, state="waiting", reason=found.reason)
+        elif stopping:
+            self._change(member, state="waiting")
         else:
             self._failures[key] += 1
             again = self._failures[key] <= RETRIES
