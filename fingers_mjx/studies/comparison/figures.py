@@ -14,6 +14,9 @@ from fingers_mjx.studies.statistics.compare import Arm, Difference
 ACROSS = 3
 """Panels side by side."""
 
+WIDTH = 9.6
+"""Of every figure [inch], so that all have letters of one size."""
+
 SHOWN = {"episode/return": "return", "episode/length": "episode length [steps]"}
 """What is drawn over training."""
 
@@ -64,7 +67,7 @@ def _panels(
     """One panel for each measure, with a row for each configuration."""
     count = len(comparison.measures)
     across, rows = min(ACROSS, count), -(-count // ACROSS)
-    size = (1.6 + 2.7 * across, rows * (0.8 + 0.34 * len(names)))
+    size = (WIDTH, rows * (0.8 + 0.34 * len(names)))
     figure, panels = panels_of(rows * across, size, rows, shared=False)
     for axes in panels[count:]:
         axes.set_visible(False)
@@ -106,7 +109,7 @@ def learning_curves(curves: Sequence[Curve], comparison: Comparison) -> Figure |
     found = [m for m in SHOWN if any(len(curve.of(m)[0]) for curve in curves)]
     if not found:
         return None
-    figure, panels = panels_of(len(found), (4.8 * len(found), 3.4))
+    figure, panels = panels_of(len(found), (WIDTH, 3.4))
     for axes, metric in zip(panels, found, strict=True):
         for name in names:
             own = [c for c in curves if c.configuration == name]
