@@ -19,6 +19,7 @@ from envs.physics.base import (
     nan_if_diverged,
 )
 from envs.physics.quiet_mjx import mjx
+from envs.physics.warp_kernels import compile_ahead
 
 
 class MjxPhysics:
@@ -54,6 +55,8 @@ class MjxPhysics:
         sizes: Any = {}
         if impl == "warp":
             _check_warp()
+            if jax.default_backend() == "gpu":
+                compile_ahead()
             sizes = {
                 "naconmax": num_worlds * contacts_per_world,
                 "njmax": constraints_per_world,

@@ -16,7 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import PRNGKeyArray
 
 from envs.base import State, VectorEnv
-from fingers_mjx.ppo.members import each
+from fingers_mjx.ppo.members import each, split_each
 from fingers_mjx.ppo.rollout import Rollout, unroll
 from fingers_mjx.ppo.scalars import PpoScalars
 from fingers_mjx.ppo.state import Learner, TrainState
@@ -49,7 +49,7 @@ def make_iteration(env: VectorEnv, learner: Learner) -> Iteration:
     def iteration(
         scalars: PpoScalars, train: TrainState, worlds: State, keys: PRNGKeyArray
     ) -> tuple[TrainState, State, PRNGKeyArray, Totals]:
-        keys, unroll_keys, update_keys = _split(keys)
+        keys, unroll_keys, update_keys = split_each(keys, 3)
         worlds, rollout, totals = unroll(env, learner, train, worlds, unroll_keys)
         train, update_totals = each(learn)(scalars, train, rollout, update_keys)
         return train, worlds, keys, totals | update_totals
@@ -82,9 +82,3 @@ def compile_iterations(iteration: Iteration, repeat: int = 1) -> Iteration:
     All arguments but the first are given away: they cannot be used after the call.
     """
     return jax.jit(repeat_iterations(iteration, repeat), donate_argnums=(1, 2, 3))
-
-
-def _split(keys: PRNGKeyArray) -> tuple[PRNGKeyArray, PRNGKeyArray, PRNGKeyArray]:
-    """Returns the keys of the next iteration, of the steps and of the updates."""
-    three = jax.vmap(lambda key: jax.random.split(key, 3), out_axes=1)(keys)
-    return three[0], three[1], three[2]

@@ -9,7 +9,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array
+from jaxtyping import Array, PRNGKeyArray
 
 
 def stacked(trees: Sequence[Any]) -> Any:
@@ -30,6 +30,11 @@ def parts(tree: Any, members: int) -> Any:
 def flat(tree: Any) -> Any:
     """Returns leaves [S, W, …] as those of a flat batch, [S·W, …]."""
     return jax.tree.map(lambda x: x.reshape(-1, *x.shape[2:]), tree)
+
+
+def split_each(keys: PRNGKeyArray, number: int) -> PRNGKeyArray:
+    """Returns `number` keys of each member's key, [number, S]."""
+    return jax.vmap(lambda key: jax.random.split(key, number), out_axes=1)(keys)
 
 
 def each(function: Callable[..., Any]) -> Callable[..., Any]:

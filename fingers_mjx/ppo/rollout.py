@@ -11,7 +11,7 @@ from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 from envs.base import State, VectorEnv
 from envs.physics.room import ROOM
 from fingers_mjx.ppo.brax import sample_action
-from fingers_mjx.ppo.members import each, flat, parts
+from fingers_mjx.ppo.members import each, flat, parts, split_each
 from fingers_mjx.ppo.state import Learner, TrainState, fixed_types
 from fingers_mjx.ppo.totals import Totals, count, total
 
@@ -91,8 +91,7 @@ def unroll(
         seen = {"obs": obs, "obs_ok": obs_ok, **drawn}
         return state, {**seen, **_outcome(state, members)}
 
-    length = learner.config.unroll_length
-    times = jax.vmap(lambda key: jax.random.split(key, length), out_axes=1)(keys)
+    times = split_each(keys, learner.config.unroll_length)
     state, steps = jax.lax.scan(step, state, times)
     last_obs, last_ok = screen(state.obs)
     ok = jnp.concatenate([steps.pop("obs_ok"), last_ok[None]])

@@ -28,13 +28,42 @@ class PpoScalars:
     desired_kl: Float[Array, ""]
 
 
-SCALARS = tuple(field.name for field in dataclasses.fields(PpoScalars))
-"""Names of these settings."""
-AT_START = ("learning_rate", "init_noise_std", "init_mean_scale")
-"""Settings that only the state at the start depends on."""
+@flax.struct.dataclass
+class StartScalars:
+    """Settings of PPO that only the state at the start depends on.
+
+    Attributes: as those of `PpoConfig`.
+    """
+
+    learning_rate: Float[Array, ""]
+    init_noise_std: Float[Array, ""]
+    init_mean_scale: Float[Array, ""]
+
+
+OWN_SCALARS = tuple(
+    field.name
+    for kind in (PpoScalars, StartScalars)
+    for field in dataclasses.fields(kind)
+)
+"""Names of all these settings."""
 
 
 def scalars_of(config: PpoConfig) -> PpoScalars:
     """Returns the numbers of one learner, as arrays of 32 bits."""
-    values = {name: jnp.float32(getattr(config, name)) for name in SCALARS}
-    return PpoScalars(**values)
+    return PpoScalars(**_values(PpoScalars, config))
+
+
+def start_scalars_of(config: PpoConfig) -> StartScalars:
+    """Returns those of its start."""
+    return StartScalars(**_values(StartScalars, config))
+
+
+def starting(config: PpoConfig, own: StartScalars) -> PpoConfig:
+    """Returns `config` with the numbers of one member's start, which may be traced."""
+    names = [field.name for field in dataclasses.fields(StartScalars)]
+    return dataclasses.replace(config, **{name: getattr(own, name) for name in names})
+
+
+def _values(kind: type, config: PpoConfig) -> dict[str, Array]:
+    names = [field.name for field in dataclasses.fields(kind)]
+    return {name: jnp.float32(getattr(config, name)) for name in names}

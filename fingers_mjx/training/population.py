@@ -13,14 +13,14 @@ from typing import Any
 from envs.config.typed import to_dict
 from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml
-from fingers_mjx.ppo.scalars import AT_START, SCALARS
+from fingers_mjx.ppo.scalars import OWN_SCALARS
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.start import FRESH, Start
 
 OWN = {
     "train.seed",
     "train.preset",
-    *(f"train.ppo.{name}" for name in (*SCALARS, *AT_START)),
+    *(f"train.ppo.{name}" for name in OWN_SCALARS),
 }
 """Settings of the learner that each member has for itself."""
 OWN_OF_TASK = ("env.weights", "env.curriculum_scale")

@@ -17,9 +17,22 @@ from envs.config.typed import to_dict
 from envs.scoring import scheduled_weights, with_weights
 from fingers_mjx.ppo.config import bound_fields
 from fingers_mjx.ppo.iteration import Iteration, make_iteration, repeat_iterations
-from fingers_mjx.ppo.members import flat, member_of, parts, stacked
+from fingers_mjx.ppo.members import (
+    each,
+    flat,
+    member_of,
+    parts,
+    split_each,
+    stacked,
+)
 from fingers_mjx.ppo.rollout import FAULTS
-from fingers_mjx.ppo.scalars import PpoScalars, scalars_of
+from fingers_mjx.ppo.scalars import (
+    PpoScalars,
+    StartScalars,
+    scalars_of,
+    start_scalars_of,
+    starting,
+)
 from fingers_mjx.ppo.state import (
     Carry,
     TrainState,
@@ -129,19 +142,17 @@ class Session:
 
     def _start(self) -> Carry:
         """Returns fresh networks, worlds and key of each member, all from its seed."""
-        seeds = [jax.random.key(setup.train.seed) for setup in self.setups]
-        keys, world_keys, network_keys = zip(*map(_three, seeds), strict=True)
-        trains = [
-            self._untrained(setup, key)
-            for setup, key in zip(self.setups, network_keys, strict=True)
-        ]
-        worlds = self._with_own_weights(self.env.reset(jnp.stack(world_keys)))
-        return Carry(stacked(trains), worlds, jnp.stack(keys))
+        seeds = jnp.stack([jax.random.key(setup.train.seed) for setup in self.setups])
+        keys, world_keys, network_keys = split_each(seeds, 3)
+        own = stacked([start_scalars_of(setup.train.ppo) for setup in self.setups])
+        train = each(self._untrained)(own, network_keys)
+        worlds = self._with_own_weights(self.env.reset(world_keys))
+        return Carry(train, worlds, keys)
 
-    def _untrained(self, setup: Setup, key: PRNGKeyArray) -> TrainState:
-        """Returns what a member starts from; only that depends on some settings."""
-        learner = make_learner(self.env, setup.train.ppo)
-        return init_train_state(learner, self.env, key)
+    def _untrained(self, own: StartScalars, key: PRNGKeyArray) -> TrainState:
+        """Returns what a member starts from."""
+        config = starting(self.learner.config, own)
+        return init_train_state(make_learner(self.env, config), self.env, key)
 
     def _with_own_weights(self, worlds: State) -> State:
         """Gives the worlds of each member the reward weights and the pace it is set."""
@@ -179,12 +190,6 @@ def bound(env: VectorEnv, setup: Setup, identity: Mapping[str, Any]) -> dict[str
         "jax": ".".join(jax.__version__.split(".")[:2]),
         "platform": jax.default_backend(),
     }
-
-
-def _three(key: PRNGKeyArray) -> tuple[PRNGKeyArray, PRNGKeyArray, PRNGKeyArray]:
-    """Returns the keys of a run, of its worlds and of its networks."""
-    key, worlds, networks = jax.random.split(key, 3)
-    return key, worlds, networks
 
 
 def _joined(carries: list[Carry]) -> Carry:
