@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import sys
 import time
 from pathlib import Path
@@ -12,10 +13,17 @@ from envs.errors import InputError, one_of
 from fingers_mjx.cli import options
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from fingers_mjx.ppo.config import TrainConfig
     from fingers_mjx.runs.setup import Setup
+    from fingers_mjx.training.population import Member
+    from fingers_mjx.training.train import Result
 
-_FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules")
+_FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules", "seeds")
+
+MEMBERS, MOST_SEEDS = "members", 100
+"""Directory of a population's members in its own, and how many there may be."""
 
 
 def add(commands) -> None:
@@ -39,6 +47,13 @@ def add(commands) -> None:
     options.settings(parser, what)
     options.backend(parser)
     options.seed(parser, None)
+    parser.add_argument(
+        "--seeds",
+        metavar="N",
+        type=options.whole(1, MOST_SEEDS),
+        help="train N learners in one program, of --seed and the seeds after it, each "
+        f"into a run directory {MEMBERS}/NN of its own",
+    )
     options.path(parser, "--hand", help="hand.yaml; default: the paper's hand")
     options.path(
         parser, "--out", metavar="RUN", help="new directory; default: under runs/"
@@ -64,27 +79,62 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.policy.interface import identity
     from fingers_mjx.runs.setup import make_env
     from fingers_mjx.training.progress import reporter
-    from fingers_mjx.training.train import Start, train
+    from fingers_mjx.training.train import train_population
 
     _check_words(args.settings)
     options.check_directory("--out", args.out)
-    resume = args.resume is not None
-    setup = _resumed(args) if resume else _new(args)
-    path = args.resume or args.out or _default_dir(setup.train)
-    env = make_env(setup, setup.train.num_envs, setup.train.backend)
+    path, members = _members(args)
+    setup = members[0].setup
+    worlds = len(members) * setup.train.num_envs
+    env = make_env(setup, worlds, setup.train.backend)
     with reporter(sys.stdout) as show:
-        show({"event": "note", "text": _headline(setup.train, path)})
-        result = train(
-            env,
-            setup,
-            path,
-            start=Start(resume, args.warm_start, args.schedules == "keep"),
-            identity=identity(env),
-            on_progress=show,
+        show({"event": "note", "text": _headline(setup.train, path, len(members))})
+        results = train_population(
+            env, members, identity=identity(env), on_progress=show
         )
-        text = f"done after {result.iterations} iterations; next: fingers eval {path}"
+        lost = [result.diverged for result in results if result.diverged]
+        if lost and len(members) == 1:
+            raise lost[0]
+        text = _done(results, members)
         show({"event": "note", "text": text})
-    return 0
+    return lost[0].exit_code if lost else 0
+
+
+def _members(args: argparse.Namespace) -> tuple[Path, list[Member]]:
+    """Returns the directory of what is trained, and the learners: one, or several."""
+    from fingers_mjx.training.population import Member
+    from fingers_mjx.training.start import Start
+
+    if args.resume is not None:
+        inside = sorted((args.resume / MEMBERS).glob("*"))
+        paths = inside or [args.resume]
+        _check_resumed(args, len(inside))
+        start = Start(resume=True)
+        return args.resume, [Member(_resumed(args, p), p, start) for p in paths]
+    setup = _new(args)
+    path = args.out or _default_dir(setup.train)
+    start = Start(False, args.warm_start, args.schedules == "keep")
+    if args.seeds is None:
+        return path, [Member(setup, path, start)]
+    return path, [
+        Member(_of_seed(setup, index), path / MEMBERS / f"{index:02d}", start)
+        for index in range(args.seeds)
+    ]
+
+
+def _of_seed(setup: Setup, index: int) -> Setup:
+    """Returns the settings of the learner whose seed is so many after the first."""
+    train = dataclasses.replace(setup.train, seed=setup.train.seed + index)
+    return dataclasses.replace(setup, train=train)
+
+
+def _done(results: Sequence[Result], members: Sequence[Member]) -> str:
+    """Returns the last sentence."""
+    most = max(result.iterations for result in results)
+    lost = [m.run_dir.name for m, r in zip(members, results, strict=True) if r.diverged]
+    left = f"; diverged: {', '.join(lost)}" if lost else ""
+    place = members[0].run_dir
+    return f"done after {most} iterations{left}; next: fingers eval {place}"
 
 
 def _new(args: argparse.Namespace) -> Setup:
@@ -114,19 +164,26 @@ def _check_words(assignments: list[str]) -> None:
             raise InputError("--set", name, value, f"without --set, {valid}")
 
 
-def _resumed(args: argparse.Namespace) -> Setup:
-    """Returns the saved settings; what may be changed in them, `--set` changes."""
-    from fingers_mjx.runs.setup import overridden, run_setup
-
+def _check_resumed(args: argparse.Namespace, members: int) -> None:
+    """Refuses options that a run to go on with has decided already."""
     for name in _FOR_NEW_RUNS:
         if (found := getattr(args, name)) is not None:
             option = f"--{name.replace('_', '-')}"
             raise InputError(option, "", found, "only without --resume")
-    saved = run_setup(args.resume)
+    if members and args.seed is not None:
+        valid = f"nothing: {members} members have seeds of their own"
+        raise InputError("--seed", "", args.seed, valid)
+
+
+def _resumed(args: argparse.Namespace, path: Path) -> Setup:
+    """Returns the saved settings; what may be changed in them, `--set` changes."""
+    from fingers_mjx.runs.setup import overridden, run_setup
+
+    saved = run_setup(path)
     for name in ("task", "preset", "backend", "seed"):
         found, was = getattr(args, name), getattr(saved.train, name)
         if found not in (None, was):
-            raise InputError(args.resume, name, found, f"{was}, as saved")
+            raise InputError(path, name, found, f"{was}, as saved")
     return overridden(saved, args.settings)
 
 
@@ -136,10 +193,11 @@ def _default_dir(config: TrainConfig) -> Path:
     return Path("runs") / f"{config.task}-{config.preset}-{config.seed}-{now}"
 
 
-def _headline(config: TrainConfig, path: Path) -> str:
-    steps: Any = config.iterations * config.steps_per_iteration
+def _headline(config: TrainConfig, path: Path, members: int) -> str:
+    steps: Any = config.iterations * config.steps_per_iteration * members
+    many = f"{members} learners, " if members > 1 else ""
     return (
         f"training {config.task} (preset {config.preset}, backend {config.backend}): "
-        f"{config.iterations} iterations, {steps / 1e6:.4g} M control steps, into "
-        f"{path}"
+        f"{many}{config.iterations} iterations, {steps / 1e6:.4g} M control steps, "
+        f"into {path}"
     )

@@ -74,6 +74,16 @@ def test_picture_holds_the_figures():
     assert picture.count("━") == 6  # a quarter of 24
 
 
+def test_picture_of_a_population_has_a_line_for_each_member():
+    board = Board()
+    for name, iteration in (("01", 30), ("00", 10)):
+        board.take(ROW | {"member": name, "iteration": iteration})
+    lines = drawn(board).splitlines()
+    for part in ("30/120", "2,469,134 steps", "197,530 steps/s"):  # of both together
+        assert part in lines[0]
+    assert [line.split()[:2] for line in lines[2:]] == [["00", "10"], ["01", "30"]]
+
+
 def test_first_row_may_lack_speed_and_time_left():
     board = Board()
     row = {k: v for k, v in ROW.items() if k not in ("steps_per_s", "eta_s")}

@@ -14,9 +14,11 @@ from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.physics.backends import default_backend
 from fingers_mjx.policy.interface import identity
+from fingers_mjx.policy.source import load_source
 from fingers_mjx.ppo.config import PpoConfig, TrainConfig
 from fingers_mjx.runs.setup import make_env, new_setup
-from fingers_mjx.training.train import Start, train
+from fingers_mjx.training.population import Member
+from fingers_mjx.training.train import Start, train, train_population
 
 ITERATIONS = 4
 TRAIN = TrainConfig(
@@ -110,6 +112,21 @@ def test_resume_with_another_task_is_refused(env, straight, changes, field):
     with pytest.raises(InputError) as error:
         run(straight, env, setup(**changes), resume=True)
     assert error.value.field == field
+
+
+def test_crawl_in_a_population_is_bit_equal_to_one_alone(straight, tmp_path):
+    """Whatever the other member is set to; that one has its own weights and pace."""
+    own = setup(weights={"lift": 5.0}, curriculum_scale=0.25)
+    ppo = dataclasses.replace(TRAIN.ppo, entropy_cost=0.02)
+    other = dataclasses.replace(own, train=dataclasses.replace(TRAIN, seed=7, ppo=ppo))
+    members = [Member(other, tmp_path / "other"), Member(setup(), tmp_path / "same")]
+    both = make_env(setup(), 2 * TRAIN.num_envs, "cpu")
+    train_population(both, members, identity=identity(both))
+    assert_same_end(straight, tmp_path / "same")
+    arrays, others = (leaves(tmp_path / name)[1] for name in ("same", "other"))
+    lift = "worlds/memory/world/weights/lift/start"
+    assert (others[lift] == 5.0).all() and (arrays[lift] != 5.0).all()
+    assert load_source(tmp_path / "other").setup.env.weights == {"lift": 5.0}
 
 
 @pytest.mark.gpu
