@@ -56,7 +56,7 @@ test-versions: $(filter .uv/bin/uv,$(UV)) ## Tests with the oldest and newest JA
 		--group dev --editable '.[viz,data]' --editable deploy
 	build/oldest/bin/python -m pytest -q -n 2 --dist loadfile $(VERSIONS)
 	$(UV) venv --quiet --clear --python $(NEWEST_PYTHON) build/newest
-	$(UV) pip install --quiet --python build/newest --upgrade \
+	$(UV) pip install --quiet --python build/newest \
 		--group dev --editable '.[viz,data]' --editable deploy
 	build/newest/bin/python -m pytest -q -n 2 --dist loadfile $(VERSIONS)
 
