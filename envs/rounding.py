@@ -21,8 +21,10 @@ def fix_rounding(environment: MutableMapping[str, str] = os.environ) -> None:
     small arrays in another order than large ones. Which it does depends on how a loop
     vectorizes, and so on the number of worlds. Here it gets no fused instruction and no
     library for sums. Vector and scalar code of exp and log still differ, so the number
-    of worlds must be 1, 2, 4 or a multiple of 8. GPU programs are not concerned, nor is
-    any processor but x86, for which XLA cannot be kept from fusing.
+    of worlds must be 1, 2, 4 or a multiple of 8; that of arctan (not arctan2) in JAX
+    0.11 at any number, and that of log1p and erfinv, with which normal numbers are
+    drawn, in JAX 0.8. GPU programs are not concerned, nor is any processor but x86, on
+    which alone XLA can be kept from fusing.
 
     To be called before JAX computes anything. A flag that is set already stays.
 
