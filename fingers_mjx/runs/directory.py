@@ -32,7 +32,6 @@ RUN_FILE = "run.json"
 CONFIG_FILE = "config.yaml"
 VERSIONS_FILE = "versions.json"
 HAND_FILE = "hand.yaml"
-CURVE = ("metrics.jsonl", "events.out.tfevents.0")
 PACKAGES = (
     "fingers-mjx",
     "jax",
@@ -135,7 +134,7 @@ def _check_purpose(path: Path, resume: bool) -> None:
         return
     if path.exists() and not path.is_dir():
         raise InputError(path, "", "a file", "a directory to make")
-    ours = {LOCK, "checkpoints", "eval", HAND_FILE, VERSIONS_FILE, RUN_FILE, *CURVE}
+    ours = {LOCK, "checkpoints", "eval", HAND_FILE, VERSIONS_FILE, RUN_FILE}
     names = {p.name for p in path.iterdir()} if path.exists() else set()
     if any(name not in ours and not name.startswith(PARTIAL) for name in names):
         valid = "a new or empty directory (--resume goes on with a run)"

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from envs.config.typed import to_dict
 from envs.errors import InputError
 from envs.physics.room import ROOM, too_little_room
 from fingers_mjx.ppo.state import Carry
 from fingers_mjx.ppo.totals import means
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.metrics import MetricsLog
 from fingers_mjx.training.dump import dump_state
 from fingers_mjx.training.errors import Diverged, Interrupted
 from fingers_mjx.training.member import Place
@@ -31,6 +31,7 @@ class LoopServices:
 
     Attributes:
         places: of the members' files.
+        logs: learning curves of the members.
         on_progress: called with every event.
         stop: whether a signal asks the run to stop.
         watchdog: ends a run that no longer advances.
@@ -38,6 +39,7 @@ class LoopServices:
     """
 
     places: Sequence[Place]
+    logs: Sequence[MetricsLog]
     on_progress: OnProgress
     stop: StopSignals
     watchdog: Watchdog
@@ -192,7 +194,7 @@ class Loop:
         """Appends the row of one member and reports what happened in it."""
         health = self._health[index]
         row["updates_skipped"] = health["skipped"]
-        place.log.append(row)
+        self.services.logs[index].append(row)
         self.services.on_progress({"event": "progress", **place.label, **row})
         if health["fault_iteration"] > self._noted[index]:
             self._noted[index] = health["fault_iteration"]
@@ -221,14 +223,8 @@ class Loop:
 
     def _save_member(self, index: int, carry: Carry, keep: int) -> Path:
         """Writes the checkpoint of one member and returns its path."""
-        place = self.services.places[index]
-        meta = {
-            "bound": place.bound,
-            "config": to_dict(place.setup.train),
-            "env_steps": self.iteration * self.config.steps_per_iteration,
-            "trained_s": time.monotonic() - self._began_s,
-        }
-        saved = checkpoint.save(place.checkpoints, self.iteration, carry, meta, keep)
+        place, trained_s = self.services.places[index], time.monotonic() - self._began_s
+        saved = place.save(carry, self.iteration, trained_s, keep)
         event = {"event": "checkpoint", **place.label, "path": str(saved)}
         self.services.on_progress(event | {"iteration": self.iteration})
         return saved

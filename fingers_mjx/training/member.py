@@ -6,9 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from envs.config.typed import to_dict
 from envs.errors import InputError
+from fingers_mjx.ppo.state import Carry
+from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.files import write_whole
-from fingers_mjx.runs.metrics import MetricsLog
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.errors import Diverged
 
@@ -17,21 +19,19 @@ END_FILE = "diverged.json"
 
 @dataclass(frozen=True)
 class Place:
-    """Where a member's state and learning curve go.
+    """Where a member's state goes.
 
     Attributes:
         name: of the member in messages and events; empty for a run of its own.
         path: run directory.
         setup: settings and hand.
         bound: what a resumed run must share.
-        log: learning curve.
     """
 
     name: str
     path: Path
     setup: Setup
     bound: Mapping[str, Any]
-    log: MetricsLog
 
     @property
     def checkpoints(self) -> Path:
@@ -46,6 +46,27 @@ class Place:
     def named(self, sentence: str) -> str:
         """Returns `sentence` with the member's name before it."""
         return f"{self.name}: {sentence}" if self.name else sentence
+
+    def save(self, carry: Carry, iteration: int, trained_s: float, keep: int) -> Path:
+        """Writes a checkpoint of the member's state and returns its path.
+
+        Args:
+            carry: its state.
+            iteration: iterations done.
+            trained_s: time spent on them [s].
+            keep: newest checkpoints that stay.
+
+        Raises:
+            OutOfSpace: if the disk is full; earlier checkpoints are intact.
+        """
+        config = self.setup.train
+        meta = {
+            "bound": self.bound,
+            "config": to_dict(config),
+            "env_steps": iteration * config.steps_per_iteration,
+            "trained_s": trained_s,
+        }
+        return checkpoint.save(self.checkpoints, iteration, carry, meta, keep)
 
     def note_end(self, error: Diverged) -> None:
         """Writes why the member stopped learning."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -157,15 +157,15 @@ def _run(
         ticker = stack.enter_context(Ticker(on_progress, TICK_S))
         session = Session(env, setups)
         begin = _begin(session, files, given, say)
-        places = [_place(stack, one, begin, len(files)) for one in files]
-        services = LoopServices(places, on_progress, stop, watchdog, ticker)
-        loop = Loop(session, services, begin)
+        places = [_place(one, len(files)) for one in files]
         if any(given):
-            loop.save()  # a run stopped early must not lose what it began with
+            begin = _saved(session, places, begin)
         for place in places:
             config = {"train": place.setup.train, "env": place.setup.env}
             record_run(place.path, config, place.bound, place.setup.hand)
-        return loop.run()
+        logs = [stack.enter_context(_curve(one, begin)) for one in files]
+        services = LoopServices(places, logs, on_progress, stop, watchdog, ticker)
+        return Loop(session, services, begin).run()
 
 
 def _ended(
@@ -201,12 +201,22 @@ def _begin(
     return begin or fresh(session, given)
 
 
-def _place(stack: ExitStack, files: Files, begin: StartPoint, members: int) -> Place:
+def _place(files: Files, members: int) -> Place:
+    """Returns where the files of a member go."""
+    member, path, facts, _ = files
+    return Place(path.name if members > 1 else "", path, member.setup, facts)
+
+
+def _saved(session: Session, places: Sequence[Place], begin: StartPoint) -> StartPoint:
+    """Saves what a population begins with, lest an early kill loses it."""
+    pairs = zip(places, session.split(begin.carry), strict=True)
+    return replace(begin, saved=[place.save(own, 0, 0.0, 1) for place, own in pairs])
+
+
+def _curve(files: Files, begin: StartPoint) -> MetricsLog:
     """Opens the curve of a member; one that had diverged keeps all its rows."""
-    member, path, facts, error = files
-    last = member.setup.train.iterations if error else begin.iteration
-    log = stack.enter_context(MetricsLog(path, last))
-    return Place(path.name if members > 1 else "", path, member.setup, facts, log)
+    member, path, _, error = files
+    return MetricsLog(path, member.setup.train.iterations if error else begin.iteration)
 
 
 def _result(path: Path, error: Diverged | None) -> Result:

@@ -132,7 +132,7 @@ def test_resume_with_another_model_is_refused(straight, more, field):
 
 
 def test_resume_with_another_jax_is_refused(straight, monkeypatch):
-    monkeypatch.setattr(jax, "__version__", "0.8.1")
+    monkeypatch.setattr(jax, "__version__", "0.7.0")
     with pytest.raises(InputError) as error:
         run(straight[0], resume=True)
     assert error.value.field == "jax"
