@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol
 
 import flax.struct
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, Key, PRNGKeyArray
 
 
 @flax.struct.dataclass
@@ -56,7 +56,7 @@ class VectorEnv(Protocol):
         """Control interval [s]."""
         ...
 
-    def reset(self, key: PRNGKeyArray) -> State:
+    def reset(self, key: PRNGKeyArray | Key[Array, " members"]) -> State:
         """Starts an episode in every world."""
         ...
 

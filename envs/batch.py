@@ -4,7 +4,7 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, PRNGKeyArray
+from jaxtyping import Array, Float, Key, PRNGKeyArray
 
 from envs.base import State
 from envs.env import HandEnv
@@ -38,7 +38,7 @@ class BatchEnv:
         """Control interval [s]."""
         return self.env.dt
 
-    def reset(self, key: PRNGKeyArray) -> State:
+    def reset(self, key: PRNGKeyArray | Key[Array, " members"]) -> State:
         """Begins `num_envs` worlds, world i from the i-th split of the key.
 
         Args:
