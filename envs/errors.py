@@ -3,6 +3,9 @@
 import difflib
 from collections.abc import Iterable
 
+BAD_INPUT = 2
+"""Exit status of a command that was given something it cannot take."""
+
 
 class InputError(ValueError):
     """Bad input: one sentence names the place, what was found and what is valid.

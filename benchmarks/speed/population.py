@@ -26,7 +26,7 @@ import jax
 from benchmarks.speed.throughput import machine, versions
 from envs.physics.backends import BACKENDS, default_backend
 from fingers_mjx.ppo.config import PRESETS, preset
-from fingers_mjx.runs.setup import Setup, make_env, new_setup
+from fingers_mjx.runs.setup import Setup, make_env, new_setup, with_seed
 from fingers_mjx.training.session import Session
 
 ROUNDS = 5
@@ -46,15 +46,13 @@ class Timed:
 
     def __init__(self, members: int, worlds: int, setup: Setup):
         begin_s = time.monotonic()
-        trains = [
-            dataclasses.replace(setup.train, seed=seed, num_envs=worlds)
-            for seed in range(members)
-        ]
-        setups = [dataclasses.replace(setup, train=train) for train in trains]
+        train = dataclasses.replace(setup.train, num_envs=worlds)
+        setup = dataclasses.replace(setup, train=train)
+        setups = [with_seed(setup, seed) for seed in range(members)]
         env = make_env(setup, members * worlds, setup.train.backend)
         self.session = Session(env, setups)
         self.carry = self.session.start()
-        self.steps = members * trains[0].steps_per_iteration
+        self.steps = members * train.steps_per_iteration
         self.advance(1)
         self.first_s = time.monotonic() - begin_s
 

@@ -25,6 +25,7 @@ SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 
 BAD_INPUT, KEYBOARD = 2, 130
+"""Here, since `envs` may be a foreign package until `check_places` has looked."""
 _EXTRAS = {
     "matplotlib": "viz",
     "imageio_ffmpeg": "viz",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import sys
 import time
 from pathlib import Path
@@ -102,6 +101,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _members(args: argparse.Namespace) -> tuple[Path, list[Member]]:
     """Returns the directory of what is trained, and the learners: one, or several."""
+    from fingers_mjx.runs.setup import with_seed
     from fingers_mjx.training.population import Member
     from fingers_mjx.training.start import Start
 
@@ -117,15 +117,13 @@ def _members(args: argparse.Namespace) -> tuple[Path, list[Member]]:
     if args.seeds is None:
         return path, [Member(setup, path, start)]
     return path, [
-        Member(_of_seed(setup, index), path / MEMBERS / f"{index:02d}", start)
+        Member(
+            with_seed(setup, setup.train.seed + index),
+            path / MEMBERS / f"{index:02d}",
+            start,
+        )
         for index in range(args.seeds)
     ]
-
-
-def _of_seed(setup: Setup, index: int) -> Setup:
-    """Returns the settings of the learner whose seed is so many after the first."""
-    train = dataclasses.replace(setup.train, seed=setup.train.seed + index)
-    return dataclasses.replace(setup, train=train)
 
 
 def _done(results: Sequence[Result], members: Sequence[Member]) -> str:

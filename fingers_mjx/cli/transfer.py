@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import dataclasses
 import json
 import sys
 from pathlib import Path
@@ -128,7 +127,7 @@ def _seeds(args: argparse.Namespace) -> range:
 def _trained(args: argparse.Namespace) -> list[list[Path]]:
     """Trains what is not trained yet; returns the two runs of each seed."""
     from envs.hand.hand_file import load_hand_file
-    from fingers_mjx.runs.setup import new_setup, overridden
+    from fingers_mjx.runs.setup import new_setup, overridden, with_seed
     from fingers_mjx.studies.transfer import train_on
     from fingers_mjx.training.progress import reporter
 
@@ -141,8 +140,7 @@ def _trained(args: argparse.Namespace) -> list[list[Path]]:
     pairs = [[args.out / name / str(seed) for name in hands] for seed in _seeds(args)]
     with reporter(sys.stdout) as show:
         for seed, paths in zip(_seeds(args), pairs, strict=True):
-            own = dataclasses.replace(setup.train, seed=seed)
-            own = dataclasses.replace(setup, train=own)
+            own = with_seed(setup, seed)
             for path, (name, hand) in zip(paths, hands.items(), strict=True):
                 text = f"training on the {name} hand, seed {seed}"
                 show({"event": "note", "text": text})

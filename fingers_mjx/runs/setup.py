@@ -67,6 +67,12 @@ def load_setup(config_file: Path, hand_file: Path, task: str) -> Setup:
     return Setup(config.train, config.env, load_hand_file(hand_file))
 
 
+def with_seed(setup: Setup, seed: int) -> Setup:
+    """Returns the same settings for a run of another seed."""
+    train = dataclasses.replace(setup.train, seed=seed)
+    return dataclasses.replace(setup, train=train)
+
+
 def overridden(setup: Setup, assignments: Iterable[str]) -> Setup:
     """Returns `setup` with the values of `--set` put in.
 

@@ -2,11 +2,9 @@
 
 from pathlib import Path
 
-from envs.errors import InputError
+from envs.errors import BAD_INPUT, InputError
 from fingers_deploy import BundleError
 from fingers_mjx.runs.files import OutOfSpace, is_full
-
-BAD_INPUT = 2
 
 
 class Diverged(RuntimeError):

@@ -101,10 +101,10 @@ class Loop:
             if self._due(self.config.log_every):
                 self._log()
             if self.services.stop.requested:
-                raise Interrupted(self.save(), self.iteration)
+                raise Interrupted(self._save(), self.iteration)
             if self._due(self.config.checkpoint_every):
-                self.save()
-        self.save()
+                self._save()
+        self._save()
         return self.ended
 
     def _due(self, every: int) -> bool:
@@ -205,7 +205,7 @@ class Loop:
         """Reports a sentence for the user."""
         self.services.on_progress({"event": "note", **place.label, "text": sentence})
 
-    def save(self) -> Path:
+    def _save(self) -> Path:
         """Writes the checkpoints of the present iteration that are missing.
 
         Of a population one more is kept: killed between two members, all still have

@@ -5,7 +5,7 @@ Seed, networks, optimizer, normalizer, adaptive rate, curriculum counters, rewar
 weights and the numbers of PPO are each member's own; all else is compiled in.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from envs.config.typed import to_dict
 from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml
 from fingers_mjx.ppo.scalars import OWN_SCALARS
+from fingers_mjx.runs.directory import flat
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.start import FRESH, Start
 
@@ -45,7 +46,7 @@ class Member:
 def program(setup: Setup) -> dict[str, Any]:
     """Returns, by dotted name, what a member shares with the others of its program."""
     train, env = to_dict(setup.train), to_dict(setup.env) if setup.env else {}
-    found = dict(_leaves({"train": train, "env": env}))
+    found = flat({"train": train, "env": env})
     found["hand"] = hand_yaml(setup.hand)
     return {k: v for k, v in found.items() if not _is_own(k)}
 
@@ -54,8 +55,9 @@ def check_population(members: Sequence[Member]) -> None:
     """Checks that one program can train `members`.
 
     Raises:
-        InputError: no member, two in one directory, or one that differs from the first
-            in a setting that is compiled in, naming it.
+        InputError: no member, two in one directory, some that resume beside new ones,
+            or one that differs from the first in a setting that is compiled in, naming
+            it.
     """
     if not members:
         raise InputError("population", "members", 0, "one or more")
@@ -63,6 +65,9 @@ def check_population(members: Sequence[Member]) -> None:
     for place in places:
         if places.count(place) > 1:
             raise InputError("population", "run_dir", place, "one directory a member")
+    if len({member.start.resume for member in members}) > 1:
+        found, valid = "members that resume and new ones", "one or the other"
+        raise InputError("population", "start", found, f"{valid}, in turn")
     first = program(members[0].setup)
     for member in members[1:]:
         other = program(member.setup)
@@ -82,12 +87,3 @@ def _apart(member: Member, name: str, found: Any, was: Any) -> InputError:
 def _is_own(name: str) -> bool:
     """Whether each member has the setting `name` for itself."""
     return name in OWN or name.startswith(OWN_OF_TASK)
-
-
-def _leaves(tree: Mapping[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yields the leaves of nested mappings with their dotted names."""
-    for name, value in tree.items():
-        if isinstance(value, Mapping):
-            yield from _leaves(value, f"{prefix}{name}.")
-        else:
-            yield f"{prefix}{name}", value

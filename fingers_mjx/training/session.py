@@ -94,6 +94,7 @@ class Session:
         members: how many there are.
         names: of the metrics, in the order of `Report.sums`.
         terms: names that `Health.first_term` points into.
+        template: shapes and types of the state of one member.
     """
 
     def __init__(self, env: VectorEnv, setups: Sequence[Setup]):
@@ -108,12 +109,9 @@ class Session:
         shapes = jax.eval_shape(iteration, self._scalars, *_parts(whole))
         self.names = sorted(shapes[3])
         self.terms = watched_names(whole.train.params)
+        self.template = jax.eval_shape(self._part, whole)[0]
         self._call = jax.jit(_reporting(iteration), donate_argnums=(1, 2, 3))
         self._split, self._join = jax.jit(self._part), jax.jit(_joined)
-
-    def template(self) -> Carry:
-        """Returns shapes and types of the state of one member."""
-        return jax.eval_shape(lambda: self._part(self._start())[0])
 
     def start(self) -> Carry:
         """Returns the carried state of an untrained population."""

@@ -118,11 +118,16 @@ def restored(
         checkpoint.set_aside(directory, int(newest.name))
     say(f"going on from {newest}")
     saved = [directory / newest.name for directory in directories]
-    carries = [
-        _frozen(session, directory, say) if error else _loaded(session, at)
-        for directory, error, at in zip(directories, ended, saved, strict=True)
+    loaded = [
+        None if error else checkpoint.load(at)
+        for error, at in zip(ended, saved, strict=True)
     ]
-    meta, carry = checkpoint.load(newest).meta, strong(session.join(carries))
+    carries = [
+        _frozen(session, directory, say) if one is None else one.into(session.template)
+        for directory, one in zip(directories, loaded, strict=True)
+    ]
+    meta = next(one.meta for one in loaded if one is not None)
+    carry = strong(session.join(carries))
     return StartPoint(carry, meta["iteration"], meta["trained_s"], saved, ended)
 
 
@@ -143,18 +148,13 @@ def _common(directories: Sequence[Path], say: Say) -> Path | None:
         at_most = min(steps)
 
 
-def _loaded(session: Session, path: Path) -> Carry:
-    """Returns the state of one member that was saved at `path`."""
-    return checkpoint.load(path).into(session.template())
-
-
 def _frozen(session: Session, directory: Path, say: Say) -> Carry:
     """Returns the last state of a member that had diverged, which it will keep."""
     newest = checkpoint.newest(directory, say)
     if newest is None:
         carry = session.split(session.start())[0]
     else:
-        carry = _loaded(session, newest)
+        carry = checkpoint.load(newest).into(session.template)
     limit = jnp.full((), session.learner.config.max_bad_updates, jnp.int32)
     health = replace(carry.train.health, worst_streak=limit)
     return replace(carry, train=replace(carry.train, health=health))

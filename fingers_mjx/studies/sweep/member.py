@@ -9,6 +9,7 @@ from fingers_mjx.evaluation import source as evaluating
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import load_source
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.directory import CONFIG_FILE
 from fingers_mjx.runs.setup import make_env, overridden
 from fingers_mjx.studies.sweep.outcome import is_evaluated
 from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
@@ -74,14 +75,15 @@ def _train(
 def start_of(training: Training, before: Path | None) -> Start | None:
     """Returns how a stage begins or goes on, None if it is finished.
 
-    A run that was killed before its first checkpoint begins again.
+    A run that was killed before its first checkpoint begins again, as does one that has
+    what its warm start brought but not yet its settings, which are written after that.
 
     Args:
         training: the stage.
         before: run directory of the stage before.
     """
     saved = checkpoint.checkpoints(training.path / "checkpoints")
-    if not saved:
+    if not saved or not (training.path / CONFIG_FILE).exists():
         shutil.rmtree(training.path, ignore_errors=True)
         keep = training.keep_schedules
         return Start(warm_start=before, keep_schedules=keep)

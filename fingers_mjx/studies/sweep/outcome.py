@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any, Literal
 
 from envs.config.atomic_file import write_atomic
+from envs.errors import BAD_INPUT
 from fingers_mjx.evaluation.files import SUMMARY_FILE
+from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.studies.sweep.plan import LOG_FILE, Key
+from fingers_mjx.training.errors import Diverged, Interrupted
 
 OUTCOME_FILE = "outcome.json"
-CRASHED, BAD_INPUT, DIVERGED, DISK_FULL, STOPPED = 1, 2, 3, 4, 75
-"""Exit statuses of a worker, as those of the command line."""
+CRASHED = 1
+"""Exit status of a worker that met a fault; the others are those of the errors."""
 LOG_BYTES = 1 << 14
 
 Verdict = Literal["done", "again", "failed", "diverged", "full"]
@@ -62,11 +65,11 @@ def outcome(root: Path, key: Key, run: Path, status: int) -> Outcome:
         return Outcome("done")
     noted = _noted(key.directory(root) / OUTCOME_FILE)
     status, reason = noted.get("status", status), noted.get("reason", "")
-    if status == DIVERGED:
+    if status == Diverged.exit_code:
         return Outcome("diverged", f"{reason}; the same seed would diverge again")
     if status == BAD_INPUT:
         return Outcome("failed", reason)
-    if status == DISK_FULL:
+    if status == OutOfSpace.exit_code:
         return Outcome("full", reason)
     return Outcome("again", reason or _without_words(root, key, status))
 
@@ -96,7 +99,7 @@ def _without_words(root: Path, key: Key, status: int) -> str:
         return f"killed by SIGKILL, as when memory runs out; last line: {last}"
     if status < 0:
         return f"killed by {signal.Signals(-status).name}; last line: {last}"
-    if status == STOPPED:
+    if status == Interrupted.exit_code:
         hung = next((x for x in last_lines(root, key, 400) if "no progress" in x), "")
         return f"hung: {hung}" if hung else f"stopped by a signal; last line: {last}"
     return f"ended with status {status}; last line: {last}"

@@ -8,13 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from fingers_mjx.runs.directory import locked
+from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.studies.sweep.book import Book
 from fingers_mjx.studies.sweep.engine import Engine, Job
 from fingers_mjx.studies.sweep.manifest import Manifest
-from fingers_mjx.studies.sweep.outcome import DISK_FULL, STOPPED, outcome
+from fingers_mjx.studies.sweep.outcome import outcome
 from fingers_mjx.studies.sweep.plan import Key
 from fingers_mjx.studies.sweep.promote import promoted
 from fingers_mjx.studies.sweep.resolve import LOCK_FILE
+from fingers_mjx.training.errors import Interrupted
 from fingers_mjx.training.signals import StopSignals
 
 POLL_S = 0.1
@@ -23,13 +25,13 @@ POLL_S = 0.1
 class SweepStopped(RuntimeError):
     """A signal stopped the sweep (status 75)."""
 
-    exit_code = STOPPED
+    exit_code = Interrupted.exit_code
 
 
 class SweepFull(RuntimeError):
     """The disk is full, which stops the sweep (status 4)."""
 
-    exit_code = DISK_FULL
+    exit_code = OutOfSpace.exit_code
 
 
 @contextmanager

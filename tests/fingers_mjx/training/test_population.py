@@ -240,3 +240,10 @@ def test_two_members_in_one_directory_are_refused(tmp_path):
         check_population([first, first])
     with pytest.raises(InputError, match="members"):
         check_population([])
+
+
+def test_members_that_resume_and_new_ones_are_not_mixed(tmp_path):
+    first, second, *_ = members(tmp_path)
+    gone_on = Member(second.setup, second.run_dir, Start(resume=True))
+    with pytest.raises(InputError, match="one or the other"):
+        check_population([first, gone_on])

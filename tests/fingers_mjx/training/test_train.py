@@ -141,7 +141,7 @@ def test_resume_with_another_jax_is_refused(straight, monkeypatch):
 def test_warm_start_takes_networks_and_normalizer_but_not_the_noise(straight):
     session = Session(make_env(16), [setup()])
     fresh = session.split(session.start())[0].train
-    old = checkpoint.load(straight[1].checkpoint).into(session.template()).train
+    old = checkpoint.load(straight[1].checkpoint).into(session.template).train
     warm = to_host(started_from(fresh, session.env, straight[0]))
     assert any("std_" in name for name in warm)
     for name, value in warm.items():
@@ -179,7 +179,7 @@ def test_warm_start_from_other_networks_is_refused(straight, tmp_path):
 def test_policy_read_back_acts_like_the_network(straight):
     policy = load_policy(straight[0])
     session = Session(make_env(16), [setup()])
-    state = checkpoint.load(straight[1].checkpoint).into(session.template())
+    state = checkpoint.load(straight[1].checkpoint).into(session.template)
     obs = np.linspace(-2, 2, 9, dtype=np.float32)[:, None]
     train_state = state.train
     mean, std = session.learner.networks.policy_network.apply(
