@@ -6,7 +6,7 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.errors import check_ordered
+from envs.errors import InputError, check_ordered
 from envs.observations import InputTerm
 from envs.streams import stream
 
@@ -19,6 +19,8 @@ class CommandConfig:
         vel_x_mps, vel_y_mps, yaw_rate_rps: uniform ranges.
         resample_s: time between commands; ours, the paper only says that it happens.
         standing_fraction: share of commands that are zero; ours.
+        turning_fraction: share without planar velocity; ours.
+        straight_fraction: share without yaw rate; ours.
     """
 
     vel_x_mps: tuple[float, float] = field(
@@ -34,29 +36,45 @@ class CommandConfig:
     standing_fraction: float = field(
         default=0.05, metadata={"unit": "1", "low": 0.0, "high": 1.0}
     )
+    turning_fraction: float = field(
+        default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
+    )
+    straight_fraction: float = field(
+        default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
+    )
 
     def __post_init__(self) -> None:
         check_ordered(self, "vel_x_mps", "vel_y_mps", "yaw_rate_rps")
+        if (shares := self.turning_fraction + self.straight_fraction) > 1.0:
+            what = "command.turning_fraction + command.straight_fraction"
+            raise InputError("configuration", what, f"{shares:g}", "1 at most")
 
 
 def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"]:
-    """Draws a command, c = (1 − b) u with u ~ U(low, high) and b ~ Bernoulli(p).
+    """Draws a command, c = (1 − b) k ∘ u with u ~ U(low, high) and b ~ Bernoulli(p).
+
+    k is (0, 0, 1) in the share of commands that turn, (1, 1, 0) in that of those that
+    are straight and 1 in the others.
 
     Args:
         key: of the draw.
-        config: ranges, and the share p of standing commands.
+        config: ranges, and the shares, p of standing commands.
 
     Returns:
         v_x, v_y [m/s] and the yaw rate [rad/s] in V.
 
     Source:
-        Paper, crawling (ranges); standing commands are ours.
+        Paper, crawling (ranges); the shares are ours.
     """
     ranges = (config.vel_x_mps, config.vel_y_mps, config.yaw_rate_rps)
     low, high = jnp.array(ranges).T
     command = jax.random.uniform(stream(key, "command"), (3,), minval=low, maxval=high)
     stand = jax.random.bernoulli(stream(key, "standing"), config.standing_fraction)
-    return jnp.where(stand, 0.0, command)
+    kind = jax.random.uniform(stream(key, "kind"))
+    turns = kind < config.turning_fraction
+    straight = ~turns & (kind < config.turning_fraction + config.straight_fraction)
+    zero = stand | jnp.stack([turns, turns, straight])
+    return jnp.where(zero, 0.0, command)
 
 
 def command_term(config: CommandConfig) -> InputTerm:

@@ -132,7 +132,10 @@ class HandEnv:
             key=key,
             variation=draw_variation(stream(key, "variation"), config.randomize),
             weights=scheduled_weights(
-                self.table, config.weights, config.curriculum_scale
+                self.table,
+                config.weights,
+                config.curriculum_scale,
+                config.schedule_scale,
             ),
             total_steps=jnp.zeros((), jnp.int32),
             episodes=jnp.zeros((), jnp.int32),

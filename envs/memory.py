@@ -56,6 +56,7 @@ class Memory:
         command: v_x, v_y [m/s] and yaw rate [rad/s] of the coming step.
         lift: `rewards.LiftMemory` of tasks whose table binds it.
         air_time: `rewards.AirTimeMemory`, likewise.
+        mean_error: `rewards.MeanErrorMemory`, likewise.
         task: what else the task carries, a pytree of its own.
     """
 
@@ -68,4 +69,5 @@ class Memory:
     command: Float[Array, "*b 3"]
     lift: Any = None
     air_time: Any = None
+    mean_error: Any = None
     task: Any = None

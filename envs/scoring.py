@@ -39,21 +39,30 @@ def table_of(task: str, name: str) -> RewardTable:
     return tables[name]
 
 
-def check_weights(table: RewardTable, values: Mapping[str, float]) -> None:
-    """Checks that weights are those of rows.
+def check_rows(
+    table: RewardTable,
+    values: Mapping[str, float],
+    schedule_scale: Mapping[str, float],
+) -> None:
+    """Checks that weights and factors are those of rows.
 
     Raises:
         InputError: there is no row of that name.
     """
     rows = [row.name for row in table]
-    for name in values:
-        if name not in rows:
-            valid = one_of(rows, name)
-            raise InputError("configuration", f"weights.{name}", name, valid)
+    given = {"weights": values, "schedule_scale": schedule_scale}
+    for field, names in given.items():
+        for name in names:
+            if name not in rows:
+                valid = one_of(rows, name)
+                raise InputError("configuration", f"{field}.{name}", name, valid)
 
 
 def scheduled_weights(
-    table: RewardTable, values: Mapping[str, float], curriculum_scale: float
+    table: RewardTable,
+    values: Mapping[str, float],
+    curriculum_scale: float,
+    schedule_scale: Mapping[str, float],
 ) -> dict[str, Schedule]:
     """Weights of a table with other values and another pace.
 
@@ -62,15 +71,17 @@ def scheduled_weights(
         values: row name -> weight in the place of the one that a schedule starts, or
             after a switch ends, with.
         curriculum_scale: factor on the steps at which schedules change.
+        schedule_scale: row name -> further factor on those of its schedule.
 
     Raises:
         InputError: there is no row of that name.
     """
-    check_weights(table, values)
+    check_rows(table, values, schedule_scale)
     weights = table_weights(table, None)
     for name, value in values.items():
         weights = weights | {name: _with_value(weights[name], value)}
-    return {k: _with_time_scale(w, curriculum_scale) for k, w in weights.items()}
+    scale, own = curriculum_scale, schedule_scale
+    return {k: _with_time_scale(w, scale * own.get(k, 1.0)) for k, w in weights.items()}
 
 
 def with_weights(state: State, weights: Mapping[str, Schedule]) -> State:

@@ -33,6 +33,7 @@ class HandSettings:
             without giving the bound).
         curriculum_scale: factor on the steps of the reward schedules; 1 is the
             paper's, which is made for 8,000 iterations of 24 steps.
+        schedule_scale: a further factor for the schedule of single rows, by name.
         weights: reward weights that replace the start value of the table's.
         randomize: domain randomization.
         contacts_per_world, constraints_per_world: room for contacts and constraint
@@ -47,6 +48,9 @@ class HandSettings:
     action_scale_rad: float = field(default=0.060, metadata={"unit": "rad", "low": 0.0})
     action_clip: float = field(default=1.5, metadata={"unit": "1", "low": 0.1})
     curriculum_scale: float = field(default=1.0, metadata={"unit": "1", "low": 1e-3})
+    schedule_scale: dict[str, float] = field(
+        default_factory=dict, metadata={"unit": "1", "low": 1e-3}
+    )
     weights: dict[str, float] = field(default_factory=dict)
     randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
     contacts_per_world: int = field(default=48, metadata={"low": 1, "free": True})

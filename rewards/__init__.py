@@ -56,6 +56,13 @@ from rewards.lift import (
     lift_gate,
     lift_step,
 )
+from rewards.mean_velocity import (
+    MeanErrorMemory,
+    init_mean_error_memory,
+    mean_error_step,
+    track_mean_planar_velocity,
+    track_mean_yaw_rate,
+)
 from rewards.motion import roll_pitch_rate, vertical_velocity
 from rewards.posture import flat_orientation
 from rewards.pushing import (
@@ -69,7 +76,7 @@ from rewards.schedules import Constant, GeometricDecay, Schedule, StepSwitch
 from rewards.shaping import safe_norm, smoothstep, tracking_kernel
 from rewards.smoothness import action_rate
 from rewards.stance import level_height, palm_tilt, stance_height, stance_pose
-from rewards.tables.crawl import CRAWL, STOCK
+from rewards.tables.crawl import CRAWL, STEERING, STOCK
 from rewards.tables.keyboard import KEYBOARD
 from rewards.tables.names import TABLES
 from rewards.tables.push import PUSH
@@ -81,6 +88,7 @@ __all__ = [
     "KEYBOARD",
     "PUSH",
     "RECOVERY",
+    "STEERING",
     "STOCK",
     "TABLES",
     "AirTimeMemory",
@@ -90,6 +98,7 @@ __all__ = [
     "GeometricDecay",
     "LiftMemory",
     "LiftParams",
+    "MeanErrorMemory",
     "RewardTable",
     "RewardTerm",
     "Schedule",
@@ -106,6 +115,7 @@ __all__ = [
     "init_air_time_memory",
     "init_footprint_memory",
     "init_lift_memory",
+    "init_mean_error_memory",
     "is_commanded",
     "joint_acceleration",
     "keys_touched",
@@ -113,6 +123,7 @@ __all__ = [
     "lift_frequency_hz",
     "lift_gate",
     "lift_step",
+    "mean_error_step",
     "object_at_target",
     "object_delivered",
     "object_progress",
@@ -132,6 +143,8 @@ __all__ = [
     "swing_against_command",
     "table_weights",
     "torque",
+    "track_mean_planar_velocity",
+    "track_mean_yaw_rate",
     "track_planar_velocity",
     "track_yaw_rate",
     "tracking_kernel",

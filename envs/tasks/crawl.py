@@ -14,7 +14,7 @@ from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import unrotate
-from envs.scoring import check_weights, table_of
+from envs.scoring import check_rows, table_of
 from envs.signals import Signals
 from envs.streams import stream
 from envs.tasks.gait import Walking
@@ -28,7 +28,8 @@ class CrawlConfig(UprightSettings):
 
     Attributes:
         rewards: name of the reward table, see `rewards.TABLES`; "footprint" is the
-            paper's, "stock" the one that the paper compares it with.
+            paper's, "stock" the one that the paper compares it with, "steering" the
+            first with rows for the mean velocity (ours).
         reset_speed_mps: largest base speed at reset, each axis (ours).
         command: ranges of the commands.
     """
@@ -39,7 +40,7 @@ class CrawlConfig(UprightSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_weights(table_of("crawl", self.rewards), self.weights)
+        check_rows(table_of("crawl", self.rewards), self.weights, self.schedule_scale)
         if self.command.resample_s < self.control_dt_s:
             found, valid = self.command.resample_s, f">= {self.control_dt_s:g} s"
             raise InputError("configuration", "command.resample_s", found, valid)

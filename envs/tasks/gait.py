@@ -17,12 +17,15 @@ from rewards import (
     AirTimeParams,
     LiftMemory,
     LiftParams,
+    MeanErrorMemory,
     air_time_step,
     footprint_step,
     init_air_time_memory,
     init_footprint_memory,
     init_lift_memory,
+    init_mean_error_memory,
     lift_step,
+    mean_error_step,
 )
 
 FOOTPRINT = "footprint_target_v"
@@ -84,11 +87,12 @@ class Walking(HandTask):
 
         Returns:
             The memory, and what the rewards bind: `footprint_target_v` [m],
-            `lift_magnitude` [m/s], `air_time_magnitude` [s].
+            `lift_magnitude` [m/s], `air_time_magnitude` [s], `mean_error_v` [m/s, m/s,
+            rad/s].
 
         Source:
             Paper, eqs. (1) and (2), and Isaac Lab; see `rewards.footprint_step`,
-            `rewards.lift_step`, `rewards.air_time_step`.
+            `rewards.lift_step`, `rewards.air_time_step`, `rewards.mean_error_step`.
         """
         extras = {}
         if self.binds(FOOTPRINT):
@@ -150,8 +154,23 @@ def _air_time(
     return air_time_step(memory, force_n, planar, dt_s, AirTimeParams())
 
 
+def _mean_error(
+    memory: MeanErrorMemory, signals: Signals, dt_s: float
+) -> tuple[MeanErrorMemory, Float[Array, "3"]]:
+    """The mean error of the velocity."""
+    vel_v, angvel_v = signals.vel_v, signals.angvel_v
+    return mean_error_step(memory, vel_v, angvel_v, signals.command, dt_s)
+
+
 _STEPPED = (
     Stepped("lift_magnitude", "lift", init_lift_memory, _lift, with_command=True),
+    Stepped(
+        "mean_error_v",
+        "mean_error",
+        init_mean_error_memory,
+        _mean_error,
+        with_command=True,
+    ),
     Stepped(
         "air_time_magnitude",
         "air_time",

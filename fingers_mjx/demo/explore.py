@@ -18,7 +18,7 @@ from fingers_mjx.evaluation.evaluate import (
     Progress,
     evaluate,
 )
-from fingers_mjx.policy.actor import Network, act
+from fingers_mjx.policy.actor import Network, acting
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def explore(
     """
     return evaluate(
         Exploring(env, noise_std),
-        lambda obs: act(network, obs["state"]),
+        acting(network),
         Episodes(env.num_envs, steps, jax.random.key(seed)),
         Measuring(float(env.mj_model.body_mass.sum())),
         progress,

@@ -6,6 +6,7 @@ from functools import partial
 
 import jax
 import numpy as np
+from jax.tree_util import Partial
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State, VectorEnv
@@ -97,21 +98,24 @@ def evaluate(
 
     Args:
         env: the environment; the batch is as large as its `reset` makes it.
-        policy: from batched observations to batched actions, deterministic.
+        policy: from batched observations to batched actions, deterministic; what a
+            `jax.tree_util.Partial` binds is no constant of the compiled program.
         episodes: which ones.
         measuring: what is measured.
         progress: called with (steps done, steps in all) from time to time.
     """
     number, steps = episodes.number, episodes.steps
-    advance = jax.jit(partial(_advance, env, policy))
-    rollouts, reset = [], jax.jit(env.reset)
+    stretch = min(REPORT_EVERY, steps)
+    # In one program: on a GPU single steps would wait for their launch, each anew.
+    advance = jax.jit(partial(_advance, env, stretch))
+    rollouts, reset, policy = [], jax.jit(env.reset), Partial(policy)
     while (count := sum(r.done.shape[1] for r in rollouts)) < number:
         state = reset(jax.random.fold_in(episodes.key, len(rollouts)))
         worlds = len(state.done)
         report = _reporting(
             progress, count // worlds * steps, -(-number // worlds) * steps
         )
-        rollouts.append(_rollout(advance, state, steps, report))
+        rollouts.append(_rollout(partial(advance, policy), state, steps, report))
     traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
     return episode_table(traces, float(env.dt), measuring)
 
@@ -136,9 +140,16 @@ def _task_measures(measure: TaskMeasures, trace: Trace) -> dict[str, Array]:
     return measure(vars(trace) | trace.extra, steps_alive(trace.done, trace.failed))
 
 
-def _advance(env: VectorEnv, policy: Policy, state: State) -> tuple[State, Trace]:
-    after = env.step(state, policy(state.obs))
-    return after, record(after)
+def _advance(
+    env: VectorEnv, steps: int, policy: Policy, state: State
+) -> tuple[State, Trace]:
+    """Returns the state after a stretch of so many steps, and their trace."""
+
+    def one(state: State, _: None) -> tuple[State, Trace]:
+        after = env.step(state, policy(state.obs))
+        return after, record(after)
+
+    return jax.lax.scan(one, state, length=steps)
 
 
 def _rollout(
@@ -147,14 +158,14 @@ def _rollout(
     steps: int,
     report: Callable[[int], None],
 ) -> Trace:
-    taken = []
-    for index in range(steps):
-        state, now = advance(state)
-        taken.append(now)
-        if (index + 1) % REPORT_EVERY == 0:
-            jax.block_until_ready(now)
-            report(index + 1)
-    return jax.tree.map(lambda *x: np.stack(x), *jax.device_get(taken))
+    """Returns the trace of `steps` steps; the last stretch may be longer."""
+    taken, done = [], 0
+    while done < steps:
+        state, stretch = advance(state)
+        taken.append(jax.device_get(stretch))
+        done += len(taken[-1].done)
+        report(min(done, steps))
+    return jax.tree.map(lambda *x: np.concatenate(x)[:steps], *taken)
 
 
 def _reporting(progress: Progress | None, before: int, total: int):

@@ -30,7 +30,7 @@ from fingers_mjx.evaluation.files import (
     write_table,
 )
 from fingers_mjx.evaluation.measures import CONTACT_N
-from fingers_mjx.policy.actor import act
+from fingers_mjx.policy.actor import acting
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures
 from fingers_mjx.reports.page import commit_here
@@ -85,7 +85,8 @@ def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     ranges = [(float(value), float(value)) for value in command]
     fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
     fixed = dict(zip(fields, ranges, strict=True))
-    changed = dataclasses.replace(setup.env.command, **fixed, standing_fraction=0.0)
+    shares = {f"{kind}_fraction": 0.0 for kind in ("standing", "turning", "straight")}
+    changed = dataclasses.replace(setup.env.command, **fixed, **shares)
     return _with_fields(setup, command=changed)
 
 
@@ -124,7 +125,7 @@ def evaluate_source(
     batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
     table = evaluate(
         batch,
-        lambda obs: act(source.network, obs["state"]),
+        acting(source.network),
         Episodes(episodes, batch.episode_length, jax.random.key(seed)),
         measuring(batch),
         progress,

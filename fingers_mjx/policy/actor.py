@@ -6,8 +6,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
+import flax.struct
 import jax
+import jax.numpy as jnp
 import numpy as np
+from jax.tree_util import Partial
 from jaxtyping import Array, Float
 
 from envs.errors import InputError
@@ -23,17 +26,17 @@ class Network(Protocol):
     """Normalizer and dense layers, wherever they come from."""
 
     @property
-    def mean(self) -> Float[np.ndarray, " n"]:
+    def mean(self) -> Float[np.ndarray | Array, " n"]:
         """Mean of each observation."""
         ...
 
     @property
-    def std(self) -> Float[np.ndarray, " n"]:
+    def std(self) -> Float[np.ndarray | Array, " n"]:
         """Standard deviation of each observation."""
         ...
 
     @property
-    def layers(self) -> tuple[tuple[np.ndarray, np.ndarray], ...]:
+    def layers(self) -> tuple[tuple[np.ndarray | Array, np.ndarray | Array], ...]:
         """Kernel [in, out] and bias [out] of each layer."""
         ...
 
@@ -75,6 +78,32 @@ def load_policy(path: Path) -> Policy:
         noise_std=_noise(arrays),
         meta=dict(saved.meta),
     )
+
+
+@flax.struct.dataclass
+class _Weights:
+    """A network as arrays of JAX, a pytree."""
+
+    mean: Float[np.ndarray | Array, " n"]
+    std: Float[np.ndarray | Array, " n"]
+    layers: tuple[tuple[np.ndarray | Array, np.ndarray | Array], ...]
+
+
+def acting(network: Network) -> Partial:
+    """Returns the network as a function from observations to mean actions.
+
+    What is compiled with it serves every network of the same sizes: its numbers are
+    arguments and not constants.
+    """
+    layers = [
+        (jnp.asarray(kernel), jnp.asarray(bias)) for kernel, bias in network.layers
+    ]
+    mean, std = jnp.asarray(network.mean), jnp.asarray(network.std)
+    return Partial(_act_on, _Weights(mean, std, tuple(layers)))
+
+
+def _act_on(weights: _Weights, obs: Mapping[str, Array]) -> Array:
+    return act(weights, obs["state"])
 
 
 def act(policy: Network, obs: Float[Array, "*b n"]) -> Float[Array, "*b a"]:

@@ -24,7 +24,7 @@ OWN = {
     *(f"train.ppo.{name}" for name in OWN_SCALARS),
 }
 """Settings of the learner that each member has for itself."""
-OWN_OF_TASK = ("env.weights", "env.curriculum_scale")
+OWN_OF_TASK = ("env.weights", "env.curriculum_scale", "env.schedule_scale")
 """Those of the task."""
 
 

@@ -158,8 +158,10 @@ class Session:
             return worlds
         env: Any = self.env
         weights = [
-            scheduled_weights(env.table, s.env.weights, s.env.curriculum_scale)
-            for s in self.setups
+            scheduled_weights(
+                env.table, e.weights, e.curriculum_scale, e.schedule_scale
+            )
+            for e in (setup.env for setup in self.setups)
         ]
         worlds_each = self.env.num_envs // self.members
         repeated = jax.tree.map(

@@ -1,9 +1,10 @@
-"""Reward tables of the crawl task: the paper's, and the stock one it compares with.
+"""Reward tables of the crawl task: the paper's, the stock one, and one that steers.
 
-The signals that the rows bind are attributes of `envs.signals.Signals`, and four extras
+The signals that the rows bind are attributes of `envs.signals.Signals`, and five extras
 that the caller adds (`envs.tasks.gait`): `footprint_target_v` (from `footprint_step`),
-`lift_magnitude` (from `lift_step`), `air_time_magnitude` (from `air_time_step`) and
-`gravity_v`, the unit vector of gravity in V.
+`lift_magnitude` (from `lift_step`), `air_time_magnitude` (from `air_time_step`),
+`mean_error_v` (from `mean_error_step`) and `gravity_v`, the unit vector of gravity in
+V.
 """
 
 from rewards.compose import RewardTable, RewardTerm, precomputed
@@ -11,6 +12,7 @@ from rewards.contact import undesired_contact
 from rewards.direction import swing_against_command
 from rewards.effort import joint_acceleration, torque
 from rewards.footprint import footprint_departure
+from rewards.mean_velocity import track_mean_planar_velocity, track_mean_yaw_rate
 from rewards.motion import roll_pitch_rate, vertical_velocity
 from rewards.posture import flat_orientation
 from rewards.schedules import GeometricDecay, StepSwitch
@@ -67,6 +69,20 @@ CRAWL: RewardTable = (
     *REGULARIZERS,
 )
 """The paper's crawl reward (paper, table of training settings)."""
+
+STEERING: RewardTable = (
+    *CRAWL,
+    RewardTerm(
+        "track_mean_planar_velocity", track_mean_planar_velocity, 0.5, ("mean_error_v",)
+    ),
+    RewardTerm(
+        "track_mean_yaw_rate",
+        track_mean_yaw_rate,
+        StepSwitch(before=0.0, after=1.0, at_steps=CURRICULUM_STEPS),
+        ("mean_error_v",),
+    ),
+)
+"""The paper's reward and, ours, what makes the mean velocity obey the command."""
 
 STOCK: RewardTable = (
     _PLANAR_TRACKING,

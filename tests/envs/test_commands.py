@@ -44,3 +44,24 @@ def test_another_range_moves_no_other_command():
 def test_a_range_the_wrong_way_round_is_refused():
     with pytest.raises(InputError, match=r"yaw_rate_rps: found \[1, -1\]"):
         CommandConfig(yaw_rate_rps=(1.0, -1.0))
+
+
+def test_shares_of_commands_turn_on_the_spot_or_go_straight():
+    every = draw(CommandConfig(standing_fraction=0.0))
+    shares = CommandConfig(
+        standing_fraction=0.0, turning_fraction=0.2, straight_fraction=0.3
+    )
+    mixed = draw(shares)
+    turning, straight = (mixed[:, :2] == 0).all(axis=1), mixed[:, 2] == 0
+    # 20 and 30 % of 4,000 with five standard deviations of 25 and 29 on each side
+    assert 670 < turning.sum() < 930 and 1050 < straight.sum() < 1350
+    assert not (turning & straight).any()
+    np.testing.assert_array_equal(mixed[turning, 2], every[turning, 2])
+    np.testing.assert_array_equal(mixed[straight, :2], every[straight, :2])
+    rest = ~turning & ~straight
+    np.testing.assert_array_equal(mixed[rest], every[rest])
+
+
+def test_shares_above_one_are_refused():
+    with pytest.raises(InputError, match=r"found 1\.1; valid: 1 at most"):
+        CommandConfig(turning_fraction=0.6, straight_fraction=0.5)

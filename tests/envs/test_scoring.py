@@ -13,8 +13,8 @@ TABLE = (
 )
 
 
-def world(steps=0, values=None, pace=1.0):
-    weights = scheduled_weights(TABLE, values or {}, pace)
+def world(steps=0, values=None, pace=1.0, own=None):
+    weights = scheduled_weights(TABLE, values or {}, pace, own or {})
     return PerWorldState(
         key=None,
         variation=None,
@@ -47,6 +47,13 @@ def test_values_replace_the_start_or_the_end_of_a_switch():
     assert terms == pytest.approx({"one": 0.06, "two": 0.7})
 
 
+def test_single_rows_have_a_pace_of_their_own():
+    assert pay(world(4, own={"two": 0.5}))[2]["two"] == 0
+    assert pay(world(5, own={"two": 0.5}))[2]["two"] == pytest.approx(-0.1)
+    both = pay(world(5, pace=2.0, own={"two": 0.25}))[2]["two"]
+    assert both == pytest.approx(-0.1)
+
+
 @pytest.mark.parametrize("a", [1.0, np.nan, np.inf])
 def test_an_invalid_step_pays_nothing_and_counts(a):
     after, reward, terms = pay(world(), valid=False, a=a)
@@ -56,4 +63,6 @@ def test_an_invalid_step_pays_nothing_and_counts(a):
 
 def test_a_weight_without_a_row_is_refused():
     with pytest.raises(InputError, match=r"weights\.lfit: .*did you mean lift\?"):
-        scheduled_weights(CRAWL, {"lfit": 1.0}, 1.0)
+        scheduled_weights(CRAWL, {"lfit": 1.0}, 1.0, {})
+    with pytest.raises(InputError, match=r"schedule_scale\.lfit: .*mean lift\?"):
+        scheduled_weights(CRAWL, {}, 1.0, {"lfit": 1.0})

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from envs.scoring import check_weights
+from envs.scoring import check_rows
 from envs.tasks.keyboard.requests import RequestConfig, check_requests
 from envs.tasks.keyboard.variation import KeyboardVariation
 from envs.tasks.upright import UprightSettings
@@ -32,5 +32,5 @@ class KeyboardConfig(UprightSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_weights(KEYBOARD, self.weights)
+        check_rows(KEYBOARD, self.weights, self.schedule_scale)
         check_requests(self.requests, self.control_dt_s)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 
 from envs.errors import check_ordered
-from envs.scoring import check_weights
+from envs.scoring import check_rows
 from envs.tasks.push.camera import CameraConfig
 from envs.tasks.upright import UprightSettings
 from rewards import PUSH
@@ -42,6 +42,6 @@ class PushConfig(UprightSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_weights(PUSH, self.weights)
+        check_rows(PUSH, self.weights, self.schedule_scale)
         check_ordered(self, "target_m", "target_bearing_deg", "object_friction")
         check_ordered(self, "object_m", "object_bearing_deg")

@@ -16,7 +16,7 @@ from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import multiply, unrotate
-from envs.scoring import check_weights
+from envs.scoring import check_rows
 from envs.signals import Signals, tilt_from_level
 from envs.streams import stream
 from envs.task import HandSettings, HandTask
@@ -64,7 +64,7 @@ class RecoveryConfig(HandSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_weights(RECOVERY, self.weights)
+        check_rows(RECOVERY, self.weights, self.schedule_scale)
 
 
 @flax.struct.dataclass

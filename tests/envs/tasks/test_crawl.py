@@ -92,7 +92,7 @@ def test_lift_weight_decays_to_a_tenth(crawl):
 
 
 def test_changed_weights_and_pace():
-    weights = scheduled_weights(CRAWL, {"lift": 2.0, "torque": 0.0}, 0.5)
+    weights = scheduled_weights(CRAWL, {"lift": 2.0, "torque": 0.0}, 0.5, {})
     assert weights["lift"](0) == 2.0 and weights["torque"](0) == 0.0
     assert weights["lift"](27_000) == pytest.approx(0.2)
     assert weights["track_yaw_rate"](8_999) == 0.0

@@ -116,7 +116,9 @@ def test_resume_with_another_task_is_refused(env, straight, changes, field):
 
 def test_crawl_in_a_population_is_bit_equal_to_one_alone(straight, tmp_path):
     """Whatever the other member is set to; that one has its own weights and pace."""
-    own = setup(weights={"lift": 5.0}, curriculum_scale=0.25)
+    own = setup(
+        weights={"lift": 5.0}, curriculum_scale=0.25, schedule_scale={"lift": 0.5}
+    )
     ppo = dataclasses.replace(TRAIN.ppo, entropy_cost=0.02)
     other = dataclasses.replace(own, train=dataclasses.replace(TRAIN, seed=7, ppo=ppo))
     members = [Member(other, tmp_path / "other"), Member(setup(), tmp_path / "same")]

@@ -4,10 +4,11 @@ import rewards
 from envs.registry import task_names
 
 
-def test_the_papers_crawl_reward_is_the_default_and_stock_the_other():
+def test_the_papers_crawl_reward_is_the_default_and_others_follow():
     assert [*rewards.TABLES["crawl"].items()] == [
         ("footprint", rewards.CRAWL),
         ("stock", rewards.STOCK),
+        ("steering", rewards.STEERING),
     ]
 
 
