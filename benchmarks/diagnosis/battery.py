@@ -1,10 +1,15 @@
-"""Hides effects, asks the diagnosis, and prints how often it was right.
+r"""Hides effects, asks the diagnosis, and prints how often it was right.
 
-    python -m benchmarks.diagnosis.battery --seed 7 --records 100 --out battery
+    PYTHONPATH=.:deploy python -m benchmarks.diagnosis.battery \
+        --wide --seed 5309 --only 0-699 --workers 30 --out wide
 
-Every case is drawn from the seed and its number, so one of them can be run again with
-`--only NUMBER`. Rows are written as they come; a second call with the same `--out` and
-seed goes on where the first was stopped.
+`--wide` draws every record under conditions of its own: rig, command path, effort, how
+well gains are known, rate, jitter, repeats, motion and scale; without it all records
+are those of the usual stand (`--seed 3107`). A case is drawn from the seed and its
+number, so some can be run again, or elsewhere, with `--only 7 20-39`. A row is written
+as its record finishes, into `OUT/wide-SEED.jsonl`; a second call with the same `--out`
+and seed goes on where the first was stopped. Nothing needs to be installed but the
+dependencies (Python 3.12, jax 0.11.2).
 """
 
 import argparse
@@ -14,108 +19,70 @@ import multiprocessing
 import os
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnosis.hidden.cases import RATIOS, Case, draw_case
-from benchmarks.diagnosis.hidden.sizes import SCALES
-from benchmarks.diagnosis.hidden.truth import OUTSIDE
+from benchmarks.diagnosis.factors import by_factor
+from benchmarks.diagnosis.hidden.cases import RATIOS, Case, drawn_case
+from benchmarks.diagnosis.plan import CATALOGUE, FULL, SHARES, Task, plan, wide_plan
 from benchmarks.diagnosis.score import Row, confusion, report, statistics
 
-CATALOGUE = tuple(name for name in SCALES if name not in OUTSIDE)
-SHARES = {
-    "single": 0.5,
-    "none": 0.3,
-    "double": 0.08,
-    "outside": 0.06,
-    "invisible": 0.06,
-}
+RECORDS_OF_A_PROCESS = 12
+"""After so many records a process is replaced: compiled programs take its memory."""
+
 VECTORS = ("encoder_eccentricity",)
 """Effects whose parameters are parts of one vector; errors are shares of its length."""
 
-FULL = 700
-"""Records of the full battery: 350 single ones (four for each effect and magnitude),
-210 without effect."""
-
-
-@dataclass(frozen=True)
-class Task:
-    """What to hide in one record."""
-
-    number: int
-    seed: int
-    group: str
-    effects: tuple[str, ...]
-    magnitude: str
-    kind: str
-
-
-def plan(seed: int, records: int, effects: tuple[str, ...] = CATALOGUE) -> list[Task]:
-    """Draws the tasks; effects and magnitudes take turns in a random order."""
-    rng = np.random.default_rng([seed, 2])
-    groups = [g for g, share in SHARES.items() for _ in range(round(share * records))]
-    groups = groups[:records] + ["single"] * max(records - len(groups), 0)
-    rng.shuffle(groups)
-    pairs = [(e, m) for e in effects for m in RATIOS]
-    singles = _turns(rng, pairs)
-    outsiders = _turns(rng, list(OUTSIDE))
-    tasks = []
-    for number, group in enumerate(groups):
-        hidden, magnitude = (), "medium"
-        if group == "single":
-            name, magnitude = next(singles)
-            hidden = (name,)
-        elif group == "double":
-            # A pair is drawn from different effects; one alone would be a single.
-            both = rng.choice(len(effects), 2, replace=False)
-            hidden = tuple(effects[i] for i in both)
-        elif group == "outside":
-            hidden = (next(outsiders),)
-        elif group == "invisible":
-            hidden, magnitude = ("torque_limit",), "invisible"
-        kinds = [SCALES[name].kinds for name in hidden] or [("pendulum", "joint")]
-        shared = [k for k in kinds[0] if all(k in other for other in kinds)]
-        light = [k for k in shared if k != "finger"] or shared
-        kind = str(rng.choice(light))
-        tasks.append(
-            Task(number, seed * 100_003 + number, group, hidden, magnitude, kind)
-        )
-    return tasks
-
-
-def _turns(rng, items: list):
-    while True:
-        for index in rng.permutation(len(items)):
-            yield items[index]
-
 
 def run_task(task: Task) -> Row:
-    """Draws the case and diagnoses it."""
+    """Draws the case and diagnoses it; whatever is raised is in the row."""
+    started = time.perf_counter()
+    try:
+        task, case = _case(task)
+        row = _row(task, case)
+        return replace(row, **_verdict_on(task, case))
+    except Exception as error:
+        blank = Row(task.group, task.seed, task.kind, task.effects, "", task.magnitude,
+                    1.0, "error", conditions=task.conditions.levels())  # fmt: skip
+        note = f"{type(error).__name__}: {error}"[:300]
+        return replace(blank, note=note, runtime_s=time.perf_counter() - started)
+
+
+def _case(task: Task) -> tuple[Task, Case]:
+    """Draws the case; on a pendulum where the rig does not show what is hidden."""
+    case = drawn_case(task.seed, task.effects, task.magnitude, task.conditions)
+    if not _shown(task, case) and "joint_coupling" not in task.effects:
+        task = replace(task, conditions=replace(task.conditions, rig="pendulum"))
+        case = drawn_case(task.seed, task.effects, task.magnitude, task.conditions)
+    return task, case
+
+
+def _row(task: Task, case: Case) -> Row:
+    """What was hidden; the verdict is still missing."""
+    return Row(
+        group=task.group,
+        seed=task.seed,
+        kind=task.kind,
+        effects=task.effects,
+        joint=case.joint,
+        magnitude=task.magnitude,
+        ratio=case.ratio,
+        verdict="",
+        conditions=task.conditions.levels(),
+    )
+
+
+def _verdict_on(task: Task, case: Case) -> dict:
+    """Fields of a row that the diagnosis gives."""
     from benchmarks.diagnosis.hidden.believed import believed, true_parameters
-    from envs.errors import InputError
     from sysid.diagnosis.diagnose import diagnose
 
-    case = draw_case(task.seed, task.effects, task.magnitude, task.kind)
-    kind = task.kind
-    if not _shown(task, case):
-        kind = "pendulum"
-        case = draw_case(task.seed, task.effects, task.magnitude, kind)
-    common = {
-        "group": task.group,
-        "seed": task.seed,
-        "kind": kind,
-        "effects": task.effects,
-        "joint": case.joint,
-        "magnitude": task.magnitude,
-        "ratio": case.ratio,
-    }
+    mechanism = believed(case.stand, task.conditions.effort)
     start = time.perf_counter()
-    try:
-        said = diagnose(list(case.logs), believed(case.stand), seed=task.seed)
-    except InputError as error:
-        return Row(**common, verdict="error", note=str(error))
+    said = diagnose(list(case.logs), mechanism, seed=task.seed)
+    runtime_s = time.perf_counter() - start
     errors, covered = {}, {}
     for cause in said.causes:
         if cause.effect in task.effects and task.magnitude in RATIOS:
@@ -129,19 +96,25 @@ def run_task(task: Task) -> Row:
                     errors[key] = abs(estimate.value - true[name]) / size
                     covered[key] = bool(estimate.low <= true[name] <= estimate.high)
     same = [a for a in said.alternatives if not a.distinguishable]
-    return Row(
-        **common,
-        verdict=said.verdict,
-        causes=tuple(c.effect for c in said.causes),
-        where=tuple(c.where for c in said.causes),
-        alternatives=tuple(a.effect for a in same if a.cause == said.causes[0].effect),
-        others=tuple(a.effect for a in same if a.cause != said.causes[0].effect),
-        not_observable=said.not_observable,
-        errors=errors,
-        covered=covered,
-        explained=said.gain.explained_fraction if said.gain else None,
-        runtime_s=time.perf_counter() - start,
-    )
+    closed = said.residual_gains.get("position")
+    return {
+        "verdict": said.verdict,
+        "causes": tuple(c.effect for c in said.causes),
+        "where": tuple(c.where for c in said.causes),
+        "alternatives": tuple(
+            a.effect for a in same if a.cause == said.causes[0].effect
+        ),
+        "others": tuple(a.effect for a in same if a.cause != said.causes[0].effect),
+        "not_observable": said.not_observable,
+        "errors": errors,
+        "covered": covered,
+        "explained": said.gain.explained_fraction if said.gain else None,
+        "closed_loop": (closed.heldout_rmse_before, closed.heldout_rmse_after)
+        if closed
+        else (),
+        "signs": said.unexplained,
+        "runtime_s": runtime_s,
+    }
 
 
 def _shown(task: Task, case: Case) -> bool:
@@ -169,41 +142,59 @@ def main() -> None:
     """Runs the battery from the command line."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--seed", type=int, default=None, help="default: drawn")
+    parser.add_argument("--wide", action="store_true", help="conditions of their own")
     parser.add_argument("--records", type=int, default=FULL, help=f"default {FULL}")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--effects", nargs="+", default=list(CATALOGUE))
     parser.add_argument("--groups", nargs="+", default=list(SHARES))
-    parser.add_argument("--only", type=int, nargs="+", help="numbers of cases")
+    parser.add_argument("--only", type=numbers, nargs="+", help="cases: 7 20-39")
     parser.add_argument("--out", type=Path, default=Path("battery"))
     args = parser.parse_args()
     seed = int.from_bytes(os.urandom(3)) if args.seed is None else args.seed
+    only = None if args.only is None else {n for part in args.only for n in part}
     print(f"seed {seed}, {args.records} records", flush=True)
-    tasks = plan(seed, args.records, tuple(args.effects))
+    effects = tuple(args.effects)
+    if args.wide:
+        chosen = sorted(only) if only is not None else range(args.records)
+        tasks = wide_plan(seed, chosen, effects)
+    else:
+        tasks = plan(seed, args.records, effects)
     tasks = [t for t in tasks if t.group in args.groups]
-    if args.only is not None:
-        tasks = [t for t in tasks if t.number in args.only]
-    rows = _run(tasks, args.workers, args.out, seed)
+    tasks = [t for t in tasks if only is None or t.number in only]
+    name = "wide" if args.wide else "rows"
+    rows = _run(tasks, args.workers, args.out, f"{name}-{seed}.jsonl")
     summary = {
         "seed": seed,
         "statistics": statistics(rows),
         "confusion": confusion(rows),
     }
     text = f"seed {seed}, {len(rows)} records\n{report(rows)}\n"
+    text += f"\n{by_factor(rows)}\n" if args.wide else ""
     (args.out / "battery.json").write_text(json.dumps(summary, indent=1))
     (args.out / "battery.txt").write_text(text)
     print(text)
 
 
-def _run(tasks: list[Task], workers: int, out: Path, seed: int) -> list[Row]:
+def numbers(text: str) -> range:
+    """Reads `7` or `20-39`; both ends count."""
+    first, _, last = text.partition("-")
+    return range(int(first), int(last or first) + 1)
+
+
+def _run(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
     """Runs what is not yet in the file of rows."""
     out.mkdir(parents=True, exist_ok=True)
-    file = out / f"rows-{seed}.jsonl"
+    file = out / name
     lines = file.read_text().splitlines() if file.exists() else []
     done = {row.seed: row for row in map(Row.from_json, lines)}
     missing = [task for task in tasks if task.seed not in done]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(workers, mp_context=context) as pool, open(file, "a") as f:
+    pool = ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        max_tasks_per_child=RECORDS_OF_A_PROCESS,
+    )
+    with pool, open(file, "a") as f:
         jobs = {pool.submit(run_task, task): task for task in missing}
         for job in as_completed(jobs):
             row = job.result()

@@ -24,6 +24,10 @@ SAME_MOTION = (
 along the angle, or everything measured comes later. Which one is first is a toss."""
 
 
+FAINT = 1.04
+"""Visibility below which a record cannot show what is hidden in it."""
+
+
 @dataclass(frozen=True)
 class Row:
     """One hidden case and the verdict on it.
@@ -43,6 +47,10 @@ class Row:
             there is no gain.
         runtime_s: time of the diagnosis.
         note: message of an error.
+        conditions: level of every factor of the wide battery.
+        closed_loop: held-out error of the simulated angle before and after, if there
+            is one.
+        signs: what the diagnosis says remains unexplained.
     """
 
     group: str
@@ -63,6 +71,9 @@ class Row:
     explained: float | None = None
     runtime_s: float = 0.0
     note: str = ""
+    conditions: dict[str, str] = field(default_factory=dict)
+    closed_loop: tuple[float, ...] = ()
+    signs: tuple[str, ...] = ()
 
     @property
     def named(self) -> set[str]:
@@ -93,7 +104,7 @@ class Row:
     @property
     def strength(self) -> str:
         """Magnitude by the visibility that was reached, not by the one aimed at."""
-        limits = (("weak", 1.65), ("medium", 2.8))
+        limits = (("faint", FAINT), ("weak", 1.65), ("medium", 2.8))
         return next((name for name, top in limits if self.ratio < top), "strong")
 
     def to_json(self) -> str:
@@ -111,8 +122,10 @@ class Row:
             "alternatives",
             "others",
             "not_observable",
+            "closed_loop",
+            "signs",
         )
-        data |= {name: tuple(data[name]) for name in lists}
+        data |= {name: tuple(data[name]) for name in lists if name in data}
         return Row(**data)
 
 
@@ -174,6 +187,9 @@ def statistics(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
         "share of 0.9": _mean([e >= 0.9 for e in explained]),
         "n": len(explained),
     }
+    closed = [r for r in rows if r.verdict == "found" and r.closed_loop]
+    worse = [r.closed_loop[1] > r.closed_loop[0] for r in closed]
+    result["found, and worse in closed loop"] = _rate(worse)
     result["errors raised"] = _rate(r.verdict == "error" for r in rows)
     times = [r.runtime_s for r in rows]
     result["runtime_s"] = {"median": float(np.median(times)) if times else 0.0}

@@ -1,24 +1,36 @@
 """A stand as the product's mechanism, and the truth in the product's terms."""
 
+import math
+from collections.abc import Mapping
 from dataclasses import replace
 
 from benchmarks.diagnosis.hidden.cases import Case
 from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
 from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
 from benchmarks.diagnosis.hidden.truth import Joint
-from sysid.mechanism import JointDrive, Mechanism, Nominal, model_mechanism
+from sysid.mechanism import (
+    Effort,
+    JointDrive,
+    Mechanism,
+    Nominal,
+    model_mechanism,
+)
 
 
-def believed(stand: Stand) -> Mechanism:
+def believed(stand: Stand, effort: bool = True) -> Mechanism:
     """Returns what a user would hand over together with the log."""
     joints = stand.mechanism.joints
-    drives = {n: _drive(j) for n, j in zip(stand.names, joints, strict=True)}
+    drives = {
+        name: _drive(joint, stand, "tau" if effort else "none")
+        for name, joint in zip(stand.names, joints, strict=True)
+    }
     # How the stand is turned is in the header of its log.
     upright = replace(stand.mechanism, base_quat_w=(1.0, 0.0, 0.0, 0.0))
     return model_mechanism(build(upright).model, drives)
 
 
-def _drive(joint: Joint) -> JointDrive:
+def _drive(joint: Joint, stand: Stand, effort: Effort) -> JointDrive:
+    known = stand.tolerances
     path = {
         "transport_delay": {"delay_s": (joint.delay_s, "delay_s")},
         "lowpass_cutoff": {"cutoff_hz": (joint.lowpass_hz, "lowpass_hz")},
@@ -26,13 +38,20 @@ def _drive(joint: Joint) -> JointDrive:
         "torque_limit": {"limit_nm": (joint.limit_nm, "kp")},
     }
     return JointDrive(
-        kp=Nominal(joint.kp, TOLERANCES["kp"]),
-        kd=Nominal(joint.kd, TOLERANCES["kd"]),
+        kp=Nominal(joint.kp, known["kp"], free=stand.gains_free),
+        kd=Nominal(joint.kd, known["kd"], free=stand.gains_free),
+        effort=effort,
         effects={
-            name: {key: Nominal(v, TOLERANCES[t]) for key, (v, t) in values.items()}
+            name: {key: Nominal(v, _known(known, t)) for key, (v, t) in values.items()}
             for name, values in path.items()
+            if all(math.isfinite(v) for v, _ in values.values())
         },
     )
+
+
+def _known(tolerances: Mapping[str, float], name: str) -> float:
+    """Tolerance of a parameter; a limit of the torque is known as well as ever."""
+    return TOLERANCES["kp"] if name == "kp" else tolerances[name]
 
 
 def true_parameters(case: Case, effect: str) -> dict[str, float]:

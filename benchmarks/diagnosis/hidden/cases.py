@@ -10,11 +10,12 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from benchmarks.diagnosis.hidden.recording import Recording, standard
-from benchmarks.diagnosis.hidden.sampling import Noise, exact, record, ticks
+from benchmarks.diagnosis.hidden.conditions import Conditions, parts_of
+from benchmarks.diagnosis.hidden.recording import Recording
+from benchmarks.diagnosis.hidden.sampling import exact, record, ticks
+from benchmarks.diagnosis.hidden.scaling import logged, scaled_mechanism, scaled_stand
 from benchmarks.diagnosis.hidden.sizes import SCALES
 from benchmarks.diagnosis.hidden.stands import (
-    TOLERANCES,
     Stand,
     changed,
     make_stand,
@@ -27,8 +28,8 @@ RATIOS = {"weak": 1.3, "medium": 2.0, "strong": 4.0}
 SLOW = ("thermal_derating", "clock_drift", "packet_reorder")
 """Effects that a single round does not show, or not as the others do."""
 
-RATE_HZ = 200.0
-"""Rows of a recording in a second."""
+SMALL = 0.1
+"""Share by which a nominal parameter is moved to see what its tolerance does."""
 
 SETTLED_S = 0.5
 """Time after which a record does not depend on how the joint stood before [s]."""
@@ -67,7 +68,7 @@ def draw_case(
     round_s: float = 12.0,
     lowpass_hz: float | None = None,
 ) -> Case:
-    """Draws a case.
+    """Draws a case under the usual conditions.
 
     Args:
         seed: of everything.
@@ -78,42 +79,44 @@ def draw_case(
         round_s: length of a round of the standard recording [s].
         lowpass_hz: cutoff of the firmware; drawn from 3 and 15 Hz if not given.
     """
+    usual = Conditions(rig=kind, round_s=round_s, lowpass_hz=lowpass_hz or 0.0)
+    return drawn_case(seed, effects, magnitude, usual)
+
+
+def drawn_case(
+    seed: int, effects: tuple[str, ...], magnitude: str, conditions: Conditions
+) -> Case:
+    """Draws a case under given conditions; for the others see `draw_case`."""
     rng = np.random.default_rng([seed, 1])
-    noise = Noise()
-    cutoff = lowpass_hz or float(rng.choice([3.0, 15.0]))
-    stand = make_stand(kind, rng, cutoff)
-    once = standard(rng, stand.middle, stand.reach, RATE_HZ, round_s, 1)
-    truth = base = slightly_wrong(stand.mechanism, rng)
+    noise = conditions.noise()
+    cutoff = conditions.lowpass_hz or float(rng.choice([3.0, 15.0]))
+    stand = conditions.of_stand(make_stand(conditions.rig, rng, cutoff), rng)
+    once = conditions.once(rng, stand)
+    truth = base = slightly_wrong(stand.mechanism, rng, stand.tolerances)
     joint = int(rng.choice(stand.moved))
     if magnitude == "invisible":
         stand, truth = _out_of_reach(stand, base, joint, once, rng)
     ratio = 1.0
     shapes = int(rng.integers(2**31))
     for index, name in enumerate(effects if magnitude != "invisible" else ()):
-        find = _Finder(stand, base, joint, name, once, noise, shapes + index)
+        shown = (once, noise, shapes + index, conditions.effort)
+        find = _Finder(stand, base, joint, name, *shown)
         size, ratio = find.size(RATIOS[magnitude])
         truth = find.hidden(truth, size)
-    rounds = np.tile(once.targets, (3, 1))
-    whole = Recording(RATE_HZ, rounds, _parts(once, 3))
     log = record(
         truth,
-        whole,
+        conditions.whole(once, rng, stand),
         noise,
         rng,
         palm_quat_w=stand.mechanism.base_quat_w,
         source=f"hidden case {seed}",
     )
-    names = stand.names
-    return Case(seed, stand, truth, effects, names[joint], magnitude, ratio, (log,))
-
-
-def _parts(once: Recording, rounds: int):
-    n = len(once.targets)
-    return tuple(
-        (name, k, first + k * n, last + k * n)
-        for k in range(rounds)
-        for name, _, first, last in once.parts
-    )
+    if conditions.scale != 1.0 or not conditions.effort:
+        log = logged(log, conditions.scale, conditions.effort)
+        truth = scaled_mechanism(truth, conditions.scale)
+        stand = scaled_stand(stand, conditions.scale)
+    name = stand.names[joint]
+    return Case(seed, stand, truth, effects, name, magnitude, ratio, (log,))
 
 
 def _out_of_reach(stand, base, joint, once, rng) -> tuple[Stand, Mechanism]:
@@ -141,20 +144,25 @@ def _limited(mechanism: Mechanism, joint: int, limit_nm: float) -> Mechanism:
 class _Finder:
     """Finds the size at which an effect has a given visibility."""
 
-    def __init__(self, stand, base, joint, name, once, noise, shapes):
+    def __init__(self, stand, base, joint, name, once, noise, shapes, effort=True):
         self.base, self.joint, self.name = base, joint, name
         self.scale, self.shapes = SCALES[name], shapes
         self.repeat = 3 if name in SLOW else 1
         targets = np.tile(once.targets, (self.repeat, 1))
-        self.recording = Recording(once.rate_hz, targets, _parts(once, self.repeat))
+        self.recording = Recording(once.rate_hz, targets, parts_of(once, self.repeat))
         self.times = ticks(self.recording, noise, np.random.default_rng(shapes))
         speed = float(np.std(np.diff(once.targets, axis=0))) * once.rate_hz
         self.sigma = noise.deviations(speed)
         self.moved = list(stand.moved)
+        self.tolerances = {
+            name: by
+            for name, by in stand.tolerances.items()
+            if name != self.scale.release
+        }
+        self.effort = effort
         self.plain = self._seen(base)
-        names = [f for f in TOLERANCES if f != self.scale.release]
-        self.changes = np.stack([self._change(name) for name in names], 1)
-        gram = self.changes.T @ self.changes + np.eye(len(names))
+        self.changes = np.stack([self._change(name) for name in self.tolerances], 1)
+        gram = self.changes.T @ self.changes + np.eye(len(self.tolerances))
         self.solve = np.linalg.inv(gram)
 
     def _seen(self, mechanism: Mechanism) -> np.ndarray:
@@ -163,13 +171,15 @@ class _Finder:
         kept = self.times > SETTLED_S
         parts = (angle[kept][:, self.moved], torque[kept][:, self.moved])
         scaled = [x / s for x, s in zip(parts, self.sigma, strict=True)]
+        scaled = scaled if self.effort else scaled[:1]
         return np.concatenate([x.ravel() for x in scaled])
 
     def _change(self, name: str) -> np.ndarray:
         """How the record changes when a nominal parameter moves by its tolerance."""
-        by = TOLERANCES[name]
-        moved = changed(self.base, self.joint, name, by)
-        return self._seen(moved) - self.plain
+        by = self.tolerances[name]
+        small = min(by, SMALL)
+        moved = changed(self.base, self.joint, name, small)
+        return (self._seen(moved) - self.plain) * (by / small)
 
     def hidden(self, mechanism: Mechanism, size: float) -> Mechanism:
         """The mechanism with the effect; its shape is the same at every size."""

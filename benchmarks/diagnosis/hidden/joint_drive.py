@@ -27,6 +27,7 @@ class JointDrive:
         self.times, self.targets = times, targets
         self.delay = joint.delay_s + value("transport_delay", "delay_s", 0.0)
         cutoff = value("lowpass_cutoff", "cutoff_hz", joint.lowpass_hz)
+        self.smooths = math.isfinite(cutoff)
         wh = math.tan(min(math.pi * cutoff * h, 1.5))
         self.pole, self.weight = (1.0 - wh) / (1.0 + wh), wh / (1.0 + wh)
         self.slew = min(value("slew_limit", "speed_rad_s", math.inf), joint.slew_rad_s)
@@ -77,7 +78,8 @@ class JointDrive:
     def drive(self, t: float, q: float, v: float, strength: float) -> float:
         """Returns the torque of the motor [N·m] at angle q, speed v of the motor."""
         target = self._quantized(self._arrived(t))
-        self.filtered = self.pole * self.filtered + self.weight * (target + self.input)
+        mean = self.weight * (target + self.input)
+        self.filtered = self.pole * self.filtered + mean if self.smooths else target
         self.input = target
         step = self.slew * self.h
         self.command += min(max(self.filtered - self.command, -step), step)

@@ -1,13 +1,18 @@
 """From a hidden motion to the log that a host would have written of it."""
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from benchmarks.diagnosis.hidden.plant import STEP_S
 from benchmarks.diagnosis.hidden.recording import Recording
 from benchmarks.diagnosis.hidden.simulate import Motion, simulate
 from benchmarks.diagnosis.hidden.truth import Mechanism
 from sysid.logs.log import MeasuredLog, make_log
+
+FAST_HZ = 250.0
+"""Rows in a second above which the physics takes finer steps."""
 
 
 @dataclass(frozen=True)
@@ -54,11 +59,18 @@ def exact(
     mechanism: Mechanism, recording: Recording, times: np.ndarray, start=None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Angles, torques and speeds at the ticks, without any noise (rows by joints)."""
-    motion = simulate(mechanism, times, recording.targets, start)
+    step_s = step_of(mechanism, recording)
+    motion = simulate(mechanism, times, recording.targets, start, step_s)
     angle, torque, speed = (
         _read(mechanism, motion, times, x) for x in _channels(motion)
     )
     return angle, torque, speed
+
+
+def step_of(mechanism: Mechanism, recording: Recording) -> float:
+    """Step of the physics: targets without a low-pass act between two of them [s]."""
+    plain = any(math.isinf(joint.lowpass_hz) for joint in mechanism.joints)
+    return STEP_S / 4.0 if plain or recording.rate_hz > FAST_HZ else STEP_S
 
 
 def _channels(motion: Motion):
@@ -95,7 +107,8 @@ def record(
     times = ticks(recording, noise, rng)
     taken = times + rng.normal(0.0, noise.stamp_s, times.size)
     start = recording.targets[0] + rng.normal(0.0, noise.start_rad, 1)
-    motion = simulate(mechanism, times, recording.targets, start)
+    step_s = step_of(mechanism, recording)
+    motion = simulate(mechanism, times, recording.targets, start, step_s)
     angle, torque, _ = (_read(mechanism, motion, taken, x) for x in _channels(motion))
     shape = angle.shape
     lost = rng.random(shape) < noise.lost

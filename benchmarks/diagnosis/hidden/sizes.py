@@ -58,7 +58,10 @@ def _factor(size, rng):
 
 
 def _cutoff(mechanism, joint, size, rng):
-    value = mechanism.joints[joint].lowpass_hz * math.exp(size * _sign(rng))
+    believed = mechanism.joints[joint].lowpass_hz
+    value = believed * math.exp(size * _sign(rng))
+    if math.isinf(believed):
+        value = 6.0 / size  # a filter that nobody knows of
     return mechanism.with_effect(joint, "lowpass_cutoff", cutoff_hz=value)
 
 

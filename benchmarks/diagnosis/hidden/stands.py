@@ -1,20 +1,22 @@
 """Test stands: mechanisms as they are believed to be, before anything is hidden.
 
-`pendulum` is a servo with a weight, `joint` one joint of a finger of the hand, `finger`
-all four of one, `hand` all twenty on one palm. The last three take the vendor's
-kinematics and the calibrated drive.
+`pendulum` is a servo with a weight, `axis` and `arm` are those of `rigs`; `joint` is
+one joint of a finger of the hand, `finger` all four of one, `hand` all twenty on one
+palm. The last three take the vendor's kinematics and the calibrated drive.
 """
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from benchmarks.diagnosis.hidden import rigs
 from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.hand.hand_file import load_hand_file
 from envs.hand.nominal import vendor_hand
 
-KINDS = ("pendulum", "joint", "finger", "hand")
+KINDS = ("pendulum", "axis", "arm", "joint", "finger", "hand")
 TOLERANCES = {
     "kp": 0.05,
     "kd": 0.1,
@@ -37,6 +39,8 @@ class Stand:
         mechanism: what is believed.
         moved: joints that are recorded, by index.
         middle, reach: angles about which and how far they move [rad].
+        tolerances: how wrong nominal parameters may be.
+        gains_free: whether nothing is known of the gains.
     """
 
     kind: str
@@ -44,6 +48,8 @@ class Stand:
     moved: tuple[int, ...]
     middle: np.ndarray
     reach: np.ndarray
+    tolerances: Mapping[str, float] = field(default_factory=lambda: TOLERANCES)
+    gains_free: bool = False
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -57,6 +63,9 @@ def make_stand(kind: str, rng: np.random.Generator, lowpass_hz: float = 3.0) -> 
         return _pendulum(rng, lowpass_hz)
     if kind == "hand":
         return _hand(rng, lowpass_hz)
+    if kind in ("axis", "arm"):
+        mechanism, middle, reach = getattr(rigs, kind)(rng, lowpass_hz)
+        return Stand(kind, mechanism, tuple(range(len(reach))), middle, reach)
     finger = int(rng.integers(1, 5))
     mechanism, middle, reach = _finger(finger, rng, lowpass_hz)
     if kind == "finger":
@@ -156,10 +165,14 @@ def changed(mechanism: Mechanism, joint: int, name: str, by: float) -> Mechanism
     return mechanism.with_joint(joint, replace(old, **{name: new}))
 
 
-def slightly_wrong(mechanism: Mechanism, rng: np.random.Generator) -> Mechanism:
+def slightly_wrong(
+    mechanism: Mechanism,
+    rng: np.random.Generator,
+    tolerances: Mapping[str, float] = TOLERANCES,
+) -> Mechanism:
     """Returns what a mechanism may be while it is believed to be this one."""
     for joint in range(len(mechanism.joints)):
-        for name, tolerance in TOLERANCES.items():
+        for name, tolerance in tolerances.items():
             by = tolerance * rng.uniform(-1.0, 1.0)
             mechanism = changed(mechanism, joint, name, by)
     return mechanism

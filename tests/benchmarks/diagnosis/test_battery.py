@@ -1,8 +1,13 @@
 """The battery's own arithmetic, on verdicts that are known."""
 
+from collections import Counter
+from dataclasses import replace
+
 import pytest
 
-from benchmarks.diagnosis import battery
+from benchmarks.diagnosis import battery, plan
+from benchmarks.diagnosis.factors import by_factor
+from benchmarks.diagnosis.hidden.conditions import LEVELS
 from benchmarks.diagnosis.score import Row, confusion, report, statistics, upper_bound
 
 
@@ -80,11 +85,70 @@ def test_rows_read_back_and_are_reported():
 
 
 def test_a_plan_repeats_and_has_all_groups():
-    tasks = battery.plan(5, battery.FULL)
-    assert tasks == battery.plan(5, battery.FULL) != battery.plan(6, battery.FULL)
-    assert len({t.seed for t in tasks}) == len(tasks) == battery.FULL
+    tasks = plan.plan(5, plan.FULL)
+    assert tasks == plan.plan(5, plan.FULL) != plan.plan(6, plan.FULL)
+    assert len({t.seed for t in tasks}) == len(tasks) == plan.FULL
     groups = [t.group for t in tasks]
     assert groups.count("none") >= 200
     singles = {(t.effects[0], t.magnitude) for t in tasks if t.group == "single"}
-    assert len(singles) == 3 * len(battery.CATALOGUE)
+    assert len(singles) == 3 * len(plan.CATALOGUE)
     assert all(len(set(t.effects)) == 2 for t in tasks if t.group == "double")
+
+
+def test_a_wide_record_is_drawn_from_its_number_alone():
+    """So that any range of them may run anywhere, in any order."""
+    tasks = plan.wide_plan(5, range(300))
+    assert plan.wide_plan(5, [217, 3]) == [tasks[217], tasks[3]]
+    assert plan.wide_plan(6, [217]) != [tasks[217]]
+    assert Counter(t.group for t in tasks) == {
+        group: 3 * round(100 * share) for group, share in plan.SHARES.items()
+    }
+    assert len({t.seed for t in tasks}) == 300
+
+
+def test_all_levels_of_a_factor_come_equally_often():
+    tasks = plan.wide_plan(5, range(100, 200))
+    for factor, levels in LEVELS.items():
+        if factor != "rig":  # a coupled joint needs another one
+            counts = Counter(getattr(t.conditions, factor) for t in tasks)
+            assert set(counts) == set(levels)
+            assert max(counts.values()) - min(counts.values()) <= 1, factor
+    assert len({t.conditions.clock for t in tasks}) == 100
+    gains = {t.conditions.gains for t in tasks if "stiffness" in t.effects}
+    assert gains <= {"5 %"}  # a gain that nobody knows is no effect
+
+
+def test_ranges_of_cases():
+    assert list(battery.numbers("7")) == [7]
+    assert list(battery.numbers("20-22")) == [20, 21, 22]
+
+
+def test_scores_by_factor():
+    """One line for each level, from the rows that have it."""
+    conditions = {name: str(levels[0]) for name, levels in LEVELS.items()}
+    rows = [replace(r, conditions=conditions) for r in perfect() + wrong()]
+    table = by_factor(rows).splitlines()
+    assert len(table) == 1 + sum(map(len, LEVELS.values()))
+    seen = next(line for line in table if line.startswith("effort     True"))
+    assert "12" in seen
+    assert "1/2 50 %" in seen  # false alarms
+    missing = next(line for line in table if line.startswith("effort     False"))
+    assert missing.split()[2:4] == ["0", "-"]
+
+
+def test_a_found_cause_that_makes_it_worse_is_counted():
+    worse = row(closed_loop=(0.01, 0.02))
+    better = row(closed_loop=(0.02, 0.01))
+    rate = statistics([worse, better])["found, and worse in closed loop"]
+    assert rate == {"rate": 0.5, "n": 2}
+
+
+def test_what_is_raised_is_a_row(monkeypatch):
+    task = plan.wide_plan(5, [0])[0]
+
+    def broken(task):
+        raise RuntimeError("out of memory")
+
+    monkeypatch.setattr(battery, "_case", broken)
+    row = battery.run_task(task)
+    assert (row.verdict, row.note) == ("error", "RuntimeError: out of memory")

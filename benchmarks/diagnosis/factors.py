@@ -1,0 +1,71 @@
+"""The scores of a wide battery by each of its factors.
+
+PYTHONPATH=.:deploy python -m benchmarks.diagnosis.factors ROWS.jsonl
+"""
+
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.diagnosis.hidden.conditions import LEVELS
+from benchmarks.diagnosis.score import Row, report
+
+QUIET = ("none", "not_observable")
+
+
+def by_factor(rows: Sequence[Row]) -> str:
+    """Returns a table: one line for each level of each factor."""
+    lines = [
+        f"{'factor':10s} {'level':9s} {'':5s}" + "".join(f"{t:>16s}" for t in HEAD)
+    ]
+    for factor, levels in LEVELS.items():
+        for level in map(str, levels):
+            some = [r for r in rows if r.conditions.get(factor) == level]
+            scores = "".join(f"{text:>16s}" for text in _scores(some))
+            lines.append(f"{factor:10s} {level:9s} {len(some):5d}{scores}")
+    return "\n".join(lines)
+
+
+HEAD = (
+    "first, med+str",
+    "in set",
+    "set size",
+    "false alarms",
+    "outside unexpl.",
+    "closed worse",
+    "seconds",
+)
+
+
+def _scores(rows: Sequence[Row]) -> list[str]:
+    """The scores of `HEAD` over some rows."""
+    single = [r for r in rows if r.group == "single"]
+    visible = [r for r in single if r.strength in ("medium", "strong")]
+    outside = [r for r in rows if r.group == "outside"]
+    none = [r for r in rows if r.group == "none"]
+    closed = [r.closed_loop for r in rows if r.verdict == "found" and r.closed_loop]
+    sizes = [len(r.named) for r in single if r.named]
+    return [
+        _share([r.right for r in visible]),
+        _share([r.effects[0] in r.named for r in visible]),
+        f"{np.mean(sizes):.2f}" if sizes else "-",
+        _share([r.verdict not in QUIET for r in none]),
+        _share([r.verdict == "unexplained" for r in outside]),
+        _share([after > before for before, after in closed]),
+        f"{np.median([r.runtime_s for r in rows]):.0f}" if rows else "-",
+    ]
+
+
+def _share(hits: Sequence[bool]) -> str:
+    """Hits and trials with their share."""
+    if not hits:
+        return "-"
+    return f"{sum(hits)}/{len(hits)} {100.0 * sum(hits) / len(hits):.0f} %"
+
+
+if __name__ == "__main__":
+    text = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
+    read = [Row.from_json(line) for line in text]
+    print(report(read), by_factor(read), sep="\n\n")
