@@ -55,7 +55,7 @@ def _run(source: Path, out: Path) -> int:
     from envs.config.typed import load_yaml
     from fingers_mjx.studies.sweep.book import Book
     from fingers_mjx.studies.sweep.display import display
-    from fingers_mjx.studies.sweep.engines import make_engine
+    from fingers_mjx.studies.sweep.engines.by_name import make_engine
     from fingers_mjx.studies.sweep.report import report
     from fingers_mjx.studies.sweep.resolve import keep_sweep
     from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock

@@ -9,8 +9,8 @@ from support.sweep_worker import planned
 from envs.config.typed import from_dict
 from fingers_mjx.cli.main import main
 from fingers_mjx.studies.sweep.book import Book
-from fingers_mjx.studies.sweep.engine import local
-from fingers_mjx.studies.sweep.ray_cluster import LOOPBACK, ray_cluster
+from fingers_mjx.studies.sweep.engines.engine import local
+from fingers_mjx.studies.sweep.engines.ray_cluster import LOOPBACK, ray_cluster
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
 from fingers_mjx.studies.sweep.spec import Sweep

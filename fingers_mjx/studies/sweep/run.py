@@ -10,7 +10,7 @@ from typing import Any
 from fingers_mjx.runs.directory import locked
 from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.studies.sweep.book import Book
-from fingers_mjx.studies.sweep.engine import Engine, Job
+from fingers_mjx.studies.sweep.engines.engine import Engine, Job
 from fingers_mjx.studies.sweep.manifest import Manifest
 from fingers_mjx.studies.sweep.outcome import outcome
 from fingers_mjx.studies.sweep.plan import Key

@@ -8,15 +8,15 @@ from support.sweep_setup import WORKER, plan_faults, run_fake, written
 
 from envs.config.strict_yaml import write_yaml
 from fingers_mjx.cli.main import main
-from fingers_mjx.studies.sweep import engines
-from fingers_mjx.studies.sweep.engine import local
+from fingers_mjx.studies.sweep.engines import by_name
+from fingers_mjx.studies.sweep.engines.engine import local
 
 
 @pytest.fixture
 def source(tmp_path, monkeypatch):
     """A specification, whose trainings are pretended."""
     pretended = lambda spec, root: local(spec, root, WORKER)  # noqa: E731
-    monkeypatch.setattr(engines, "local", pretended)
+    monkeypatch.setattr(by_name, "local", pretended)
     path = tmp_path / "spec.yaml"
     path.write_text(write_yaml(written()), "utf-8")
     return path

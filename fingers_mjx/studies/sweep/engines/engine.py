@@ -6,8 +6,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+from fingers_mjx.studies.sweep.engines.held import cores, gpus
+from fingers_mjx.studies.sweep.engines.process import (
+    WORKER,
+    Process,
+    worker_environment,
+)
 from fingers_mjx.studies.sweep.plan import LOG_FILE, Key
-from fingers_mjx.studies.sweep.process import WORKER, Process, worker_environment
 from fingers_mjx.studies.sweep.spec import Sweep
 
 
@@ -79,22 +84,22 @@ def worker_engine(
     def launch(keys: Sequence[Key]) -> Job:
         words, log = worker_words(command, root, keys)
         environment = worker_environment(spec.threads, spec.backend)
-        return Process(words, log, environment, spec.threads)
+        gpu = spec.backend == "warp"
+        return Process(words, log, environment, spec.threads, gpu)
 
     return Engine(slots, choose, launch)
 
 
 def default_processes(spec: Sweep) -> int:
-    """Returns how many workers this machine has cores for; one where they share a GPU.
+    """Returns how many workers this machine has cores for, or GPUs, one of each.
 
     Args:
         spec: resolved.
     """
     if spec.backend == "warp":
-        return 1
-    usable = getattr(os, "sched_getaffinity", None)
-    cores = len(usable(0)) if usable else os.cpu_count() or 1
-    return max(1, cores // (spec.threads or cores))
+        return max(1, len(gpus()))
+    number = len(cores()) or os.cpu_count() or 1
+    return max(1, number // (spec.threads or number))
 
 
 def worker_words(

@@ -1,26 +1,21 @@
 """Worker processes: their cores, their variables, how they end."""
 
-import os
 import signal
 import sys
 import time
 
 import pytest
 
-from fingers_mjx.studies.sweep import process
-from fingers_mjx.studies.sweep.process import Cores, Process, worker_environment
+from fingers_mjx.studies.sweep.engines import held
+from fingers_mjx.studies.sweep.engines.process import Process, worker_environment
 
 PROGRAM = "import os, time; print(sorted(os.sched_getaffinity(0)), os.environ['X'])"
 
 
 @pytest.fixture(autouse=True)
 def cores_of_the_test(tmp_path, monkeypatch):
-    """Cores are held in a place of the test's own."""
-    monkeypatch.setattr(process.tempfile, "gettempdir", lambda: str(tmp_path))
-
-
-def held(cores):
-    return set(cores._held)
+    """Cores and GPUs are held in a place of the test's own."""
+    monkeypatch.setattr(held.tempfile, "gettempdir", lambda: str(tmp_path))
 
 
 def ended(worker):
@@ -31,29 +26,15 @@ def ended(worker):
     raise AssertionError("the process does not end")
 
 
-def test_no_core_is_held_twice_and_each_is_free_again():
-    usable = os.sched_getaffinity(0)
-    one = Cores(1)
-    other = Cores(len(usable))
-    assert len(held(one)) == 1
-    assert held(other) == set()  # fewer are left than it asked for
-    one.free()
-    one.free()
-    again = Cores(len(usable))
-    assert held(again) == usable
-    again.free()
-    assert held(Cores(None)) == set()
-
-
 def test_a_process_runs_on_its_core_and_says_where_it_should(tmp_path):
     program = f"import time; time.sleep(0.5); {PROGRAM}"
     log = tmp_path / "deep" / "log.txt"
     worker = Process([sys.executable, "-c", program], log, {"X": "seen"}, threads=1)
-    (core,) = held(worker._cores)
+    [core] = worker._cores.names
     assert worker.poll() is None
     assert ended(worker) == 0
     assert log.read_text("utf-8").split("\n")[0] == f"[{core}] seen"
-    assert held(worker._cores) == set()
+    assert worker._cores.names == []
 
 
 def test_stop_is_a_signal_and_the_status_says_so(tmp_path):
@@ -77,3 +58,19 @@ def test_threads_are_fixed_wherever_a_worker_runs():
     assert one["JAX_PLATFORMS"] == "cpu"
     gpu = worker_environment(None, "warp")
     assert not {"PJRT_NPROC", "OMP_NUM_THREADS", "JAX_PLATFORMS"} & gpu.keys()
+
+
+def test_workers_on_one_machine_have_a_gpu_each(tmp_path, monkeypatch):
+    monkeypatch.setenv("CUDA_VISIBLE_DEVICES", "2,5")
+    program = (
+        "import os, time; time.sleep(0.5); print(os.environ['CUDA_VISIBLE_DEVICES'])"
+    )
+    logs = [tmp_path / f"{index}.txt" for index in range(3)]
+    words = [sys.executable, "-c", program]
+    workers = [Process(words, log, {}, own_gpu=True) for log in logs]
+    assert [ended(worker) for worker in workers] == [0, 0, 0]
+    # The third finds none left, and takes its chance with what all see.
+    assert [log.read_text("utf-8").strip() for log in logs] == ["2", "5", "2,5"]
+    later = Process(words, tmp_path / "later.txt", {}, own_gpu=True)
+    assert ended(later) == 0
+    assert (tmp_path / "later.txt").read_text("utf-8").strip() == "2"

@@ -1,15 +1,19 @@
 """The engine `population`: many members as one program of one process."""
 
 import json
-import subprocess
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
 from fingers_mjx.runs import checkpoint
-from fingers_mjx.studies.sweep.engine import Engine, Failures, worker_engine
-from fingers_mjx.studies.sweep.plan import Key, Training, trainings
-from fingers_mjx.studies.sweep.process import WORKER
+from fingers_mjx.studies.sweep.engines.engine import (
+    Engine,
+    Failures,
+    default_processes,
+    worker_engine,
+)
+from fingers_mjx.studies.sweep.engines.held import gpu_facts
+from fingers_mjx.studies.sweep.engines.process import WORKER
+from fingers_mjx.studies.sweep.plan import Key, Training, keys, trainings
 from fingers_mjx.studies.sweep.spec import Sweep
 from fingers_mjx.training.population import program
 
@@ -24,21 +28,23 @@ def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engi
 
     Together are members that differ only in what a population leaves to each
     (`fingers_mjx.training.population`) and have come equally far; as many as
-    `worlds_at_once` allows, and half of that for members that failed: so that memory
-    that was too small for them all suffices, and what one does to the program does not
-    befall all of them again.
+    `worlds_at_once` allows, in equal parts where several programs run at a time, and
+    half of that for members that failed: so that memory that was too small for them all
+    suffices, and what one does to the program does not befall all of them again.
 
     Args:
-        spec: resolved; without `processes` there is one program at a time.
+        spec: resolved; without `processes` there is one program at a time, on several
+            GPUs one on each.
         root: directory of the sweep, absolute.
         command: of a worker.
     """
     most = spec.worlds_at_once or machine_worlds(spec.backend)
+    slots = spec.processes or (default_processes(spec) if spec.backend == "warp" else 1)
     known: dict[Key, str] = {}
 
     def choose(waiting: Sequence[Key], failures: Failures) -> tuple[Key, ...]:
         first = waiting[0]
-        for key in waiting:
+        for key in (*keys(spec), *waiting):
             if key not in known:
                 known[key] = _shared(trainings(spec, root, key))
         alike = [
@@ -47,10 +53,11 @@ def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engi
             if (known[key], failures(key), _reached(spec, root, key))
             == (known[first], failures(first), _reached(spec, root, first))
         ]
+        share = -(-list(known.values()).count(known[first]) // slots)
         worlds = trainings(spec, root, first)[0].setup.train.num_envs
-        return tuple(alike[: max(1, (most >> failures(first)) // worlds)])
+        return tuple(alike[: max(1, min(most // worlds, share) >> failures(first))])
 
-    return worker_engine(spec, root, command, spec.processes or 1, choose)
+    return worker_engine(spec, root, command, slots, choose)
 
 
 def machine_worlds(backend: str | None) -> int:
@@ -61,11 +68,8 @@ def machine_worlds(backend: str | None) -> int:
     """
     if backend != "warp":
         return WORLDS_ON_CPU
-    query = ["nvidia-smi", "--query-gpu=memory.total", "--format=csv,noheader,nounits"]
-    with suppress(OSError, subprocess.SubprocessError, ValueError, IndexError):
-        done = subprocess.run(query, capture_output=True, text=True, check=True)
-        return int(int(done.stdout.split()[0]) / 1024 * WORLDS_PER_GIB)
-    return WORLDS_ON_CPU
+    memory_mib = [int(size) for size in gpu_facts("memory.total") if size.isdigit()]
+    return int(min(memory_mib) / 1024 * WORLDS_PER_GIB) if memory_mib else WORLDS_ON_CPU
 
 
 def _shared(stages: Sequence[Training]) -> str:

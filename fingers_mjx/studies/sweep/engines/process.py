@@ -1,21 +1,26 @@
-"""Worker processes: started on cores of their own, asked to stop, ended with us."""
+"""Worker processes: on cores and GPUs of their own, asked to stop, ended with us."""
 
-import fcntl
 import os
 import signal
 import subprocess
 import sys
-import tempfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
 from envs.rounding import VARIABLE as XLA
 from envs.rounding import fix_rounding
+from fingers_mjx.studies.sweep.engines.held import (
+    CORES,
+    GPUS,
+    VISIBLE,
+    Held,
+    cores,
+    gpus,
+)
 
 WORKER = (sys.executable, "-P", "-m", "fingers_mjx.studies.sweep.worker")
 """Command of a worker; what it trains follows."""
-CORES = "fingers-cores-{user}"
 
 
 class Process:
@@ -28,7 +33,9 @@ class Process:
         command: words of the command line.
         log: file to which its output is appended.
         environment: variables besides ours.
-        threads: cores on which it runs alone, as far as so many are left.
+        threads: cores on which it runs alone, as far as so many are left: processes
+            that step on each other's cores wait for each other's threads.
+        own_gpu: whether it has a GPU to itself, as far as one is left.
     """
 
     def __init__(
@@ -37,19 +44,25 @@ class Process:
         log: Path,
         environment: Mapping[str, str],
         threads: int | None = None,
+        own_gpu: bool = False,
     ):
         log.parent.mkdir(parents=True, exist_ok=True)
-        self._cores = Cores(threads)
+        self._cores = Held(CORES, cores(), threads)
+        self._gpu = Held(GPUS, gpus() if own_gpu else [], 1)
+        visible = dict(zip([VISIBLE], self._gpu.names, strict=False))
         with log.open("ab") as stream:
             self._process = subprocess.Popen(
                 command,
                 stdin=subprocess.PIPE,
                 stdout=stream,
                 stderr=subprocess.STDOUT,
-                env={**os.environ, **environment},
+                env={**os.environ, **environment, **visible},
                 start_new_session=True,
             )
-        self._cores.give(self._process.pid)
+        if self._cores.names:
+            with suppress(ProcessLookupError):
+                own = {int(name) for name in self._cores.names}
+                os.sched_setaffinity(self._process.pid, own)
 
     def poll(self) -> int | None:
         """Returns the exit status, negative for a signal, or None while it runs."""
@@ -58,55 +71,13 @@ class Process:
             if self._process.stdin is not None:
                 self._process.stdin.close()
             self._cores.free()
+            self._gpu.free()
         return status
 
     def stop(self) -> None:
         """Asks it to save and end."""
         with suppress(ProcessLookupError):
             self._process.send_signal(signal.SIGTERM)
-
-
-class Cores:
-    """Cores of this machine that no other worker of this user has.
-
-    Processes that step on each other's cores wait for each other's threads. A core is
-    held by locking a file, which the system frees however this process ends.
-
-    Args:
-        number: of cores; if fewer are free, or it is None, none is held.
-    """
-
-    def __init__(self, number: int | None):
-        self._held: dict[int, int] = {}
-        if number is None or not hasattr(os, "sched_setaffinity"):
-            return
-        directory = Path(tempfile.gettempdir()) / CORES.format(user=os.getuid())
-        directory.mkdir(mode=0o700, exist_ok=True)
-        for core in sorted(os.sched_getaffinity(0)):
-            if len(self._held) < number:
-                self._try(core, directory / f"{core}.lock")
-        if len(self._held) < number:
-            self.free()
-
-    def give(self, process: int) -> None:
-        """Lets a process run on these cores alone; on all if none is held."""
-        if self._held:
-            with suppress(ProcessLookupError):
-                os.sched_setaffinity(process, set(self._held))
-
-    def free(self) -> None:
-        """Leaves the cores to others; more than once does no harm."""
-        while self._held:
-            os.close(self._held.popitem()[1])
-
-    def _try(self, core: int, path: Path) -> None:
-        """Holds a core if nobody else does."""
-        handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o600)
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            self._held[core] = handle
-        except BlockingIOError:
-            os.close(handle)
 
 
 def worker_environment(threads: int | None, backend: str | None) -> dict[str, str]:
@@ -120,7 +91,7 @@ def worker_environment(threads: int | None, backend: str | None) -> dict[str, st
         threads: of a worker; as many as it finds cores if None.
         backend: physics backend; only Warp's workers look for a GPU.
     """
-    here = str(Path(__file__).parents[3])
+    here = str(Path(__file__).parents[4])
     path = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH", ""))))
     found = {"PYTHONPATH": path, "PYTHONUNBUFFERED": "1", "TF_CPP_MIN_LOG_LEVEL": "3"}
     found[XLA] = os.environ.get(XLA, "")

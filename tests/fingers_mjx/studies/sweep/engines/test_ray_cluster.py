@@ -11,7 +11,7 @@ from support import sweep_setup
 from support.sweep_setup import plan_faults, states, summaries, sweep
 
 from envs.errors import InputError
-from fingers_mjx.studies.sweep import ray_cluster
+from fingers_mjx.studies.sweep.engines import ray_cluster
 from fingers_mjx.studies.sweep.manifest import read_manifest
 
 HAS_RAY = importlib.util.find_spec("ray") is not None

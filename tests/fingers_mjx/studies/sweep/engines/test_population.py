@@ -2,9 +2,9 @@
 
 from support.sweep_setup import plan_faults, run_fake, states, sweep
 
-from fingers_mjx.studies.sweep import population as engine
+from fingers_mjx.studies.sweep.engines import population as engine
+from fingers_mjx.studies.sweep.engines.population import machine_worlds, population
 from fingers_mjx.studies.sweep.plan import Key, keys
-from fingers_mjx.studies.sweep.population import machine_worlds, population
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 
 CONFIGURATIONS = {
@@ -18,7 +18,8 @@ CONFIGURATIONS = {
 
 def chosen(root, failures=lambda key: 0, **changes):
     """Returns the groups of all members, in turn."""
-    changes = {"configurations": CONFIGURATIONS, "engine": "population"} | changes
+    base = {"configurations": CONFIGURATIONS, "engine": "population", "processes": 1}
+    changes = base | changes
     root.mkdir(exist_ok=True)
     spec = keep_sweep(sweep(**changes), root / "spec.yaml", root)
     made, waiting, groups = population(spec, root), keys(spec), []
@@ -74,7 +75,7 @@ def test_members_that_have_come_equally_far_go_on_together(tmp_path):
 def test_faults_in_one_program_are_each_members_own(tmp_path):
     """A worker of several members: who diverged, who is done, and one log."""
     plan_faults(tmp_path, {"lift/0": ["nan"], "plain/1": ["killed"]})
-    manifest = run_fake(tmp_path, population, engine="population")
+    manifest = run_fake(tmp_path, population, engine="population", processes=1)
     assert states(manifest) == {
         "plain/0": "done",
         "lift/0": "diverged",
@@ -88,14 +89,13 @@ def test_faults_in_one_program_are_each_members_own(tmp_path):
 def test_the_memory_of_a_gpu_bounds_its_worlds(monkeypatch):
     assert machine_worlds("cpu") == engine.WORLDS_ON_CPU
 
-    class Done:
-        stdout = "143771\n143771\n"
-
-    monkeypatch.setattr(engine.subprocess, "run", lambda *words, **how: Done)
+    monkeypatch.setattr(engine, "gpu_facts", lambda field: ["143771", "143771"])
     assert 8 * 4096 <= machine_worlds("warp") < 10 * 4096
-
-    def missing(*words, **how):
-        raise FileNotFoundError("nvidia-smi")
-
-    monkeypatch.setattr(engine.subprocess, "run", missing)
+    monkeypatch.setattr(engine, "gpu_facts", lambda field: [])
     assert machine_worlds("warp") == engine.WORLDS_ON_CPU
+
+
+def test_several_programs_have_equal_parts(tmp_path):
+    root = tmp_path / "sweep"
+    made = chosen(root, configurations={"plain": {}}, seeds=12, processes=4)
+    assert [len(group) for group in made] == [3, 3, 3, 3]

@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from fingers_mjx.studies.sweep.engine import Engine, local
-from fingers_mjx.studies.sweep.population import population
-from fingers_mjx.studies.sweep.ray_cluster import ray_cluster
+from fingers_mjx.studies.sweep.engines.engine import Engine, local
+from fingers_mjx.studies.sweep.engines.population import population
+from fingers_mjx.studies.sweep.engines.ray_cluster import ray_cluster
 from fingers_mjx.studies.sweep.spec import Sweep
 
 

@@ -10,9 +10,13 @@ from pathlib import Path
 from typing import Any
 
 from envs.errors import InputError
-from fingers_mjx.studies.sweep.engine import Engine, one_by_one, worker_words
+from fingers_mjx.studies.sweep.engines.engine import Engine, one_by_one, worker_words
+from fingers_mjx.studies.sweep.engines.process import (
+    WORKER,
+    Process,
+    worker_environment,
+)
 from fingers_mjx.studies.sweep.plan import Key
-from fingers_mjx.studies.sweep.process import WORKER, Process, worker_environment
 from fingers_mjx.studies.sweep.spec import Sweep
 
 LOST = 1
@@ -51,7 +55,7 @@ def ray_cluster(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Eng
     def launch(keys: Sequence[Key]) -> RayJob:
         words, log = worker_words(command, root, keys)
         environment = worker_environment(spec.threads, spec.backend)
-        actor = remote.remote(words, log, environment, spec.threads)
+        actor = remote.remote(words, log, environment, spec.threads, gpus > 0)
         return RayJob(ray, actor, log)
 
     slots = spec.processes or _slots(ray.cluster_resources(), threads, gpus)
