@@ -9,9 +9,17 @@ these. `docs/reference/safety-table.md` keeps what was measured.
 import argparse
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 import numpy as np
+from faults.channels import (
+    CHANNELS,
+    STOPPED_HAND,
+    WARNED_S,
+    fail_channel,
+    stop_hand,
+)
 from faults.lab import Lab, snapshots
 from faults.links import LOSSES, burst, measure_loss
 from faults.processes import SIGNALS, WITHIN_S, kill_one
@@ -23,7 +31,15 @@ from hand_files import WALKING, write_model
 from fingers_deploy.bundle import Bundle, load_bundle
 from fingers_robot.safety import Mode
 
-PARTS = ("matrix", "starts", "losses", "bursts", "processes", "fault_free")
+PARTS = (
+    "matrix",
+    "starts",
+    "losses",
+    "bursts",
+    "processes",
+    "channels",
+    "fault_free",
+)
 PHASES, SPACING_S = 20, 0.13
 BURSTS_MS = (30, 60, 500)
 ALLOWED_TRIPS = {0.5: 1}  # 20 lost packets in a row: once in a million
@@ -105,6 +121,34 @@ def measure_deaths(model: Path, bundle: Path, name: str, trials: int) -> dict:
     }
 
 
+def measure_channel(model: Path, bundle: Path, name: str, trials: int) -> dict:
+    """Double faults, floods and closed channels: from the fault to the order."""
+    channel = next((c for c in CHANNELS if c.name == name), None)
+    begin = time.monotonic()
+    done = [
+        stop_hand(model, bundle, seed)
+        if channel is None
+        else fail_channel(model, bundle, channel, seed)
+        for seed in range(trials)
+    ]
+    within_s = WARNED_S if channel is None else channel.within_s
+    took = [d.off_s for d in done]
+    return {
+        "fault": name,
+        "trials": trials,
+        "passed": sum(d.safe and d.off_s <= within_s for d in done),
+        "safe": sum(d.safe for d in done),
+        "within_ms": round(1e3 * within_s),
+        "median_ms": _ms(float(np.median(took))),
+        "worst_ms": _ms(max(took)),
+        "minutes": round((time.monotonic() - begin) / 60, 1),
+    }
+
+
+def _ms(seconds: float) -> float | str:
+    return round(1e3 * seconds, 1) if np.isfinite(seconds) else "never"
+
+
 def measure(part: str, options: argparse.Namespace, model: Path) -> list[dict]:
     """Measures one part; returns its rows."""
     bundle, hz, seed = load_bundle(options.bundle), options.loop_hz, options.seed
@@ -127,6 +171,10 @@ def measure(part: str, options: argparse.Namespace, model: Path) -> list[dict]:
     if part == "processes":
         trials = options.process_trials
         return [measure_deaths(model, options.bundle, n, trials) for n in SIGNALS]
+    if part == "channels":
+        trials = options.process_trials
+        names = options.channels or [*(c.name for c in CHANNELS), STOPPED_HAND]
+        return [measure_channel(model, options.bundle, n, trials) for n in names]
     return [fault_free(walking(hz), options.hours)]
 
 
@@ -151,6 +199,7 @@ def main() -> int:
     parser.add_argument("--trials", type=int, default=20)
     parser.add_argument("--start-trials", type=int, default=20)
     parser.add_argument("--process-trials", type=int, default=3)
+    parser.add_argument("--channels", nargs="+", help="only these rows of channels")
     parser.add_argument("--hours", type=float, default=0.05)
     parser.add_argument("--loss-s", type=float, default=30.0)
     parser.add_argument("--loop-hz", type=float, default=500.0)

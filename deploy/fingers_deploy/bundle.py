@@ -13,8 +13,10 @@ import numpy as np
 
 from fingers_deploy.checks import parse_manifest
 from fingers_deploy.errors import BundleError
+from fingers_deploy.files import is_folder, read_regular
 from fingers_deploy.manifest import Manifest
 from fingers_deploy.network import NumpyPolicy, read_network
+from fingers_deploy.strict_json import MAX_JSON_BYTES
 from fingers_deploy.wire import Graph, read_model
 
 POLICY_FILE = "policy.onnx"
@@ -54,9 +56,10 @@ def load_bundle(path: str | Path, joint_names: tuple[str, ...] | None = None) ->
         BundleError: one sentence that names file, field, found and valid values.
     """
     path = Path(path)
-    policy = path / POLICY_FILE if path.is_dir() else path
-    bundle = decode_bundle(_read(policy), policy)
-    if path.is_dir():
+    folder = is_folder(path, BundleError)
+    policy = path / POLICY_FILE if folder else path
+    bundle = decode_bundle(read_regular(policy, _MAX_BYTES, BundleError), policy)
+    if folder:
         _check_beside(bundle, path / MANIFEST_FILE)
     if joint_names is not None:
         check_joint_order(bundle, joint_names)
@@ -149,18 +152,6 @@ def _check_seal(data: bytes, source: object) -> None:
         raise BundleError(source, "", found, "an unchanged file of the export")
 
 
-def _read(path: Path) -> bytes:
-    """Reads a file of sane size."""
-    try:
-        with path.open("rb") as file:
-            data = file.read(_MAX_BYTES + 1)
-    except OSError as error:
-        raise BundleError(path, "", error.strerror, "a readable file") from error
-    if len(data) > _MAX_BYTES:
-        raise BundleError(path, "", "more than 64 MiB", "a policy of at most 64 MiB")
-    return data
-
-
 def _embedded(graph: Graph, source: object) -> str:
     if MANIFEST_KEY not in graph.metadata:
         valid = f"metadata with the key {MANIFEST_KEY}"
@@ -170,7 +161,7 @@ def _embedded(graph: Graph, source: object) -> str:
 
 def _check_beside(bundle: Bundle, path: Path) -> None:
     """The manifest beside the policy must be the one inside it."""
-    text = _read(path)
+    text = read_regular(path, MAX_JSON_BYTES, BundleError)
     parse_manifest(text, path)
     if text != _embedded(read_model(bundle.model), bundle.source).encode("utf-8"):
         found = "another manifest than the policy carries"

@@ -3,9 +3,13 @@
 import difflib
 from collections.abc import Iterable
 
+_SOURCE, _FIELD, _FOUND, _SENTENCE = 100, 60, 80, 300
+
 
 class InputError(ValueError):
     """Bad input: one sentence names the place, what was found and what is valid.
+
+    It has at most 300 characters, 80 of them for what was found.
 
     Args:
         source: file, command-line option or argument in which the value stands.
@@ -17,8 +21,10 @@ class InputError(ValueError):
 
     def __init__(self, source: object, field: str, found: object, valid: str):
         self.source, self.field, self.found, self.valid = source, field, found, valid
-        where = f"{source}: {field}" if field else f"{source}"
-        super().__init__(f"{where}: found {_short(found)}; valid: {valid}")
+        where = shortened(source, _SOURCE)
+        where += f": {shortened(field, _FIELD)}" if field else ""
+        sentence = f"{where}: found {shortened(found)}; valid: "
+        super().__init__(sentence + shortened(valid, _SENTENCE - len(sentence)))
 
 
 class BundleError(InputError):
@@ -28,13 +34,22 @@ class BundleError(InputError):
 def one_of(names: Iterable[str], found: str = "") -> str:
     """Lists valid names, and the one that `found` was probably meant to be."""
     listed = list(names)
-    near = difflib.get_close_matches(found, listed, n=1)
+    near = difflib.get_close_matches(found[:_FOUND], listed, n=1)
     hint = f" (did you mean {near[0]}?)" if near else ""
     return "one of " + ", ".join(listed) + hint
 
 
-def _short(value: object, limit: int = 120) -> str:
-    """Returns `value` on one printable line, shortened to `limit` characters."""
-    text = " ".join(str(value).split()) or "nothing"
+def shortened(value: object, limit: int = _FOUND) -> str:
+    """Returns a value as one printable line of at most `limit` characters.
+
+    What is left out is in the middle: two paths often differ in their ends.
+    """
+    text = str(value)
+    half = limit // 2
+    if len(text) > 4 * limit:  # before anything is done with each character
+        text = f"{text[: 2 * limit]}…{text[-2 * limit :]}"
+    text = " ".join(text.split()) or "nothing"
     text = text if text.isprintable() else ascii(text)[1:-1]
-    return text if len(text) <= limit else text[: limit - 1] + "…"
+    if len(text) <= limit:
+        return text
+    return f"{text[: limit - half]}…{text[len(text) - half + 1 :]}"

@@ -7,6 +7,7 @@ from typing import Any
 from fingers_deploy.decode import Place, Rules, decode
 from fingers_deploy.errors import BundleError
 
+MAX_JSON_BYTES = 1 << 20
 _MAX_TEXT = 200
 _FLOAT32_MAX = 3.4028234663852886e38  # all arithmetic behind the manifest is float32
 
@@ -21,8 +22,11 @@ def load_json(text: str | bytes, source: object) -> Any:
         source: name of the file, for messages.
 
     Raises:
-        BundleError: the text is not strict JSON.
+        BundleError: the text is not strict JSON, or too long to read it at all.
     """
+    if len(text) > MAX_JSON_BYTES:
+        found, valid = f"{len(text)} characters", f"at most {MAX_JSON_BYTES}"
+        raise BundleError(source, "", found, valid)
     try:
         return json.loads(text, object_pairs_hook=_unique)
     except (ValueError, RecursionError) as error:
@@ -81,7 +85,9 @@ def _found(value: Any) -> str:
 def _unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     table = dict(pairs)
     if len(table) != len(pairs):
-        names = [name for name, _ in pairs]
-        repeated = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"key {repeated!a} is repeated")
+        seen: set[str] = set()
+        for name, _ in pairs:
+            if name in seen:
+                raise ValueError(f"key {name[:_MAX_TEXT]!a} is repeated")
+            seen.add(name)
     return table

@@ -17,7 +17,7 @@ from fingers_robot.safety import ROWS, Mode, Operator
 
 SEED = 500
 FAST, SLOW = 20, 100
-ELSEWHERE = {"S17", "S20", "OP"}  # of the table's rows: starts, and test_rows
+ELSEWHERE = {"S17", "S20", "OP", "OFF"}  # of the table's rows: starts, and test_rows
 IDS = [f"{s.row} {s.name}" for s in SCENARIOS]
 
 

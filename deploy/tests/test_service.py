@@ -38,6 +38,8 @@ def test_it_is_watched_de_energizes_at_its_end_and_starts_by_hand_only():
     assert "guard" in service["Service"]["ExecStopPost"]
     assert "--arm" not in service["Service"]["ExecStart"]
     assert service["Service"]["KillMode"] == "mixed"
+    assert service["Service"]["NotifyAccess"] == "all"  # the notices are the guard's
+    assert service["Service"]["WatchdogSignal"] == "SIGKILL"  # it reaches what stands
     assert float(service["Service"]["TimeoutStopSec"]) > LAST_S
     assert "Install" not in service and "Install" not in unit("fingers-deploy.socket")
 

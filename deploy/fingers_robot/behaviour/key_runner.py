@@ -13,6 +13,9 @@ from fingers_robot.behaviour.keys import (
     keys_step,
 )
 
+MOST_KEYS = 1000
+"""That may wait at a time."""
+
 
 class KeyRunner:
     """Plays a list of keys while a policy that presses them runs.
@@ -36,8 +39,8 @@ class KeyRunner:
         self._state, self._going = begin_keys(keys, 0.0), False
 
     def ask(self, key: int) -> None:
-        """Adds a key at the end of the list, by its place in `ARROWS`."""
-        if 0 <= key < len(ARROWS):
+        """Adds a key, by its place in `ARROWS`, to a list that has room for it."""
+        if 0 <= key < len(ARROWS) and len(self._state.keys) < MOST_KEYS:
             keys = (*self._state.keys, ARROWS[key])
             self._state = dataclasses.replace(self._state, keys=keys)
 

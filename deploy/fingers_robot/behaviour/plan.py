@@ -4,18 +4,21 @@ The plan passes through the same supervisor, with the same limits, as a policy w
 """
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import Interface
+from fingers_deploy.files import read_regular
+from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
 from fingers_robot.reading import Array
 from fingers_robot.safety.motion import toward
 
 _MAX_BYTES = 64 * 2**20
+_MAX_CELLS = 2_000_000  # half an hour of 20 joints at 50 Hz
 _NO_COMMAND = padded(np.zeros(0, np.float32))
 
 
@@ -92,12 +95,16 @@ class Plan:
 
 
 def _read(path: Path) -> tuple[list[str], Array]:
+    data = read_regular(path, _MAX_BYTES)
+    columns = data[: data.find(b"\n") + 1].count(b",") + 1
+    if columns > JOINT_COUNT + 1:
+        raise InputError(path, "header", f"{columns} columns", f"t and {JOINT_COUNT}")
+    if data.count(b",") > _MAX_CELLS:
+        raise InputError(path, "", "more cells", f"at most {_MAX_CELLS}")
     try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(path, "", "a huge file", "a plan of at most 64 MiB")
-        with path.open(newline="", encoding="utf-8") as file:
-            lines = list(csv.reader(file))
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        text = io.StringIO(data.decode("utf-8"), newline="")
+        lines = list(csv.reader(text))
+    except (UnicodeDecodeError, csv.Error) as error:
         raise InputError(path, "", error, "a readable CSV file") from error
     if len(lines) < 3:
         raise InputError(path, "", f"{len(lines)} lines", "a header and two rows")

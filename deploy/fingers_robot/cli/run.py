@@ -10,14 +10,18 @@ from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.behaviour.joystick import QUIET_S
 from fingers_robot.behaviour.keys import ARROWS
-from fingers_robot.cli.console import REFUSED, drive, say
+from fingers_robot.cli.console import REFUSED, check_operator, drive
 from fingers_robot.cli.options import check_library, check_options, check_sources
+from fingers_robot.cli.parser import number, whole
+from fingers_robot.cli.speaker import Speaker
 from fingers_robot.drivers.open import KINDS
 from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_robot.runtime.guard import guard_hand
+from fingers_robot.runtime.launcher import EXIT_UNKNOWN
 
 _RUN = "bundles loop_hz mounting runtime joystick sticks plan keys keyboard tracker"
 _DRIVER = "dry_run socket log side serial imu_bus imu_address imu_mount"
+_STDOUT = 1
 WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
 
 
@@ -33,18 +37,18 @@ def add_run(commands: Any) -> None:
     parser.add_argument("--joystick", metavar="DEVICE", help="e.g. /dev/input/js0")
     parser.add_argument(
         "--joystick-quiet",
-        type=float,
+        type=number,
         default=QUIET_S,
         metavar="S",
         help="a stick held out so long without the slightest change counts as a lost "
         "gamepad (2); 0: never, where the device goes away with the radio link",
     )
     parser.add_argument(
-        "--sticks", type=float, nargs="*", default=[], help="fixed sticks, −1 to 1"
+        "--sticks", type=number, nargs="*", default=[], help="fixed sticks, −1 to 1"
     )
     parser.add_argument(
         "--heading-hold",
-        type=float,
+        type=number,
         nargs=2,
         metavar=("GAIN", "OFFSET"),
         help="hold the heading: gain [1/s], constant yaw rate [rad/s]",
@@ -95,6 +99,8 @@ def run(options: argparse.Namespace) -> int:
     bundles = [load_bundle(path) for path in options.bundles]
     if options.with_sources:
         check_sources(options, bundles)
+    if not options.unattended:
+        check_operator()
     driver = _driver(options)
     with contextlib.ExitStack() as stack:
         if options.driver == "sim" and not options.socket:
@@ -112,31 +118,34 @@ def run(options: argparse.Namespace) -> int:
             "heading_hold": heading
             and {"gain": heading[0], "offset_rad_s": heading[1]},
         }
-        status = drive(plain, options.arm, options.duration)
-        if options.driver == "sim" and status != REFUSED:
-            _print_distance(driver["socket"], bundles[0].manifest.interface)
+        speaker = Speaker(_STDOUT)
+        attended = options.arm, options.duration, options.unattended
+        status = drive(plain, speaker, *attended)
+        if options.driver == "sim" and status not in (REFUSED, EXIT_UNKNOWN):
+            speaker(_distance(driver["socket"], bundles[0].manifest.interface))
+        speaker.finish()
         return status
 
 
-def _print_distance(socket: str, interface: Interface) -> None:
-    """Prints where the simulated hand is now; its origin is where it stood first."""
+def _distance(socket: str, interface: Interface) -> str:
+    """Where the simulated hand is now; its origin is where it stood first."""
     try:
         x, y = where_the_palm_is(socket, interface)
     except OSError:
-        return  # a simulator of the user's own that has ended
+        return "simulated hand: it has ended"
     away_m = math.hypot(x, y)
-    say(f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)")
+    return f"simulated hand: {away_m:.2f} m from the origin (x {x:.2f}, y {y:.2f} m)"
 
 
 def guard(options: argparse.Namespace) -> int:
-    """De-energizes a hand; returns 0 once the hand has confirmed it, else 5."""
+    """De-energizes a hand; returns 0 once the hand has confirmed it, else 7."""
     interface = load_bundle(options.bundles[0]).manifest.interface
     check_library(options.driver)
     if options.driver == "sim" and not options.socket:
         raise InputError("--driver sim", "", "no hand", "--socket PATH of a simulator")
     safe, words = guard_hand(_driver(options), interface)
     print(words)
-    return 0 if safe else 5
+    return 0 if safe else EXIT_UNKNOWN
 
 
 def _add_driver(parser: argparse.ArgumentParser) -> None:
@@ -145,15 +154,15 @@ def _add_driver(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--dry-run", action="store_true", help="never energize")
     group.add_argument("--model", help="sim: MJCF or MJB file of the hand")
     group.add_argument("--socket", help="sim: of a simulator that runs already")
-    group.add_argument("--seed", type=int, default=0, help="sim: of the sensor noise")
+    group.add_argument("--seed", type=whole, default=0, help="sim: of the sensor noise")
     group.add_argument("--log", help="replay: MCAP file of a run")
     group.add_argument("--side", choices=("right", "left"), default="right")
     group.add_argument("--serial", help="wuji: serial number of the hand")
-    group.add_argument("--imu-bus", type=int, default=1, help="wuji: I²C bus")
-    group.add_argument("--imu-address", type=int, default=0x4A, help="wuji")
+    group.add_argument("--imu-bus", type=whole, default=1, help="wuji: I²C bus")
+    group.add_argument("--imu-address", type=whole, default=0x4A, help="wuji")
     group.add_argument(
         "--imu-mount",
-        type=float,
+        type=number,
         nargs=4,
         default=[1.0, 0.0, 0.0, 0.0],
         metavar=("W", "X", "Y", "Z"),
@@ -163,7 +172,7 @@ def _add_driver(parser: argparse.ArgumentParser) -> None:
 
 def _add_loop(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("loop")
-    group.add_argument("--loop-hz", type=float, default=500.0)
+    group.add_argument("--loop-hz", type=number, default=500.0)
     group.add_argument(
         "--no-realtime", action="store_true", help="do not ask for SCHED_FIFO"
     )
@@ -177,8 +186,13 @@ def _add_loop(parser: argparse.ArgumentParser) -> None:
         help="arm at once; only in simulation, replay and dry runs",
     )
     group.add_argument(
+        "--unattended",
+        action="store_true",
+        help="go on where nobody can type a stop or read what is said",
+    )
+    group.add_argument(
         "--duration",
-        type=float,
+        type=number,
         metavar="S",
         help="stop after so many seconds, with --arm counted from the first step",
     )

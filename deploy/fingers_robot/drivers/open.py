@@ -35,6 +35,25 @@ def open_driver(options: Mapping[str, Any], interface: Interface) -> Driver:
     return DryRun(driver) if options.get("dry_run") else driver
 
 
+def prepare_driver(options: Mapping[str, Any]) -> None:
+    """Imports what opening a driver takes, so that it will open at once.
+
+    Raises:
+        InputError: the library is missing.
+    """
+    if options["kind"] == "wuji":
+        _library()
+
+
+def _library() -> Any:
+    try:
+        import wujihandpy  # pyright: ignore[reportMissingImports]
+    except ImportError as error:
+        valid = "pip install fingers-deploy[hand]"
+        raise InputError("driver", "wuji", "no wujihandpy", valid) from error
+    return wujihandpy
+
+
 def _sim(options: Mapping[str, Any], interface: Interface) -> Driver:
     return SimDriver(options["socket"], interface)
 
@@ -44,18 +63,14 @@ def _replay(options: Mapping[str, Any], interface: Interface) -> Driver:
 
 
 def _wuji(options: Mapping[str, Any], interface: Interface) -> Driver:
-    try:
-        import wujihandpy  # pyright: ignore[reportMissingImports]
-    except ImportError as error:
-        valid = "pip install fingers-deploy[hand]"
-        raise InputError("driver", "wuji", "no wujihandpy", valid) from error
+    library = _library()
     imu: Imu = NoImu()
     if not options.get("without_imu"):
         bus = I2cBus(options["imu_bus"], options["imu_address"])
         imu = ImuPort(Bno085(bus), tuple(options["imu_mount"]))
     try:
         return WujiDriver(
-            wujihandpy, interface, imu, options["side"], options.get("serial")
+            library, interface, imu, options["side"], options.get("serial")
         )
     except BaseException:
         imu.close()

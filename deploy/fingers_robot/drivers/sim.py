@@ -1,6 +1,7 @@
 """Driver of the simulated hand, which runs in another process."""
 
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -28,12 +29,17 @@ class SimDriver:
         interface: of the policy: joint names and limits.
 
     Raises:
-        ConnectionError: there is no simulator at this path.
+        OSError: there is no simulator at this path, or none that takes drivers.
     """
 
     def __init__(self, path: str | Path, interface: Interface):
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        self._socket.connect(str(path))
+        self._socket.settimeout(_ANSWER_S)
+        try:
+            self._socket.connect(str(path))
+        except OSError:
+            self._socket.close()
+            raise
         self._socket.setblocking(False)
         self.over = False
         self._state: np.void | None = None
@@ -110,6 +116,15 @@ def where_the_palm_is(path: str | Path, interface: Interface) -> tuple[float, fl
         driver.close()
 
 
+def _refusal(line: str) -> InputError:
+    """The error that the simulator's process has said, or that it ended without one."""
+    said = re.fullmatch(r"(.+?): found (.+); valid: (.+)", line)
+    if said is not None:
+        return InputError(said[1], "", said[2], said[3])
+    valid = "a model that it can run, and the extra fingers-deploy[sim]"
+    return InputError("simulator", "", line, valid)
+
+
 class SimulatorProcess:
     """Starts and ends the simulator's process.
 
@@ -172,7 +187,5 @@ class SimulatorProcess:
                 self.process.kill()
                 _, message = self.process.communicate()
                 self._folder.cleanup()
-                lines = message.strip().splitlines() or ["no answer"]
-                valid = "a model that it can run, and the extra fingers-deploy[sim]"
-                raise InputError("simulator", "", lines[-1], valid)
+                raise _refusal((message.strip().splitlines() or ["no answer"])[-1])
             time.sleep(0.01)

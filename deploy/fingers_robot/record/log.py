@@ -87,7 +87,7 @@ def read_log(path: str | Path) -> Log:
         (time_ns * 1e-9, _string(data, path))
         for time_ns, data in found.messages.get(EVENTS_TOPIC, [])
     )
-    start = float(metadata.get("start_unix_s", "0"))
+    start = _start(metadata.get("start_unix_s", "0"), path)
     rows = _rows([data for _, data in found.messages[TOPIC]], path)
     return Log(
         source=str(path),
@@ -98,6 +98,13 @@ def read_log(path: str | Path) -> Log:
         complete=found.complete,
         summary=found.metadata.get(SUMMARY, {}),
     )
+
+
+def _start(text: str, path: str | Path) -> float:
+    try:
+        return float(text)
+    except ValueError as error:
+        raise InputError(path, "start_unix_s", text, "a time [s]") from error
 
 
 def encode_string(line: str) -> bytes:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from fingers_deploy.errors import InputError
+from fingers_deploy.files import read_regular
 from fingers_robot.record.mcap_write import (
     CHANNEL,
     CHUNK,
@@ -19,7 +20,10 @@ from fingers_robot.record.mcap_write import (
     SCHEMA,
 )
 
-_MAX_BYTES = 512 * 2**20
+_MAX_BYTES = 64 * 2**20
+"""Of a file; the recorder begins a new one before 50 MB."""
+_MAX_MESSAGES = 500_000
+_MAX_NAMES = 1000
 _CHUNK_HEAD = struct.Struct("<QQQI")
 _MESSAGE_HEAD = struct.Struct("<HIQQ")
 
@@ -34,6 +38,8 @@ class McapFile:
         messages: time [ns] and data of each message, by topic, in the file's order.
         metadata: the metadata records by name.
         complete: the data end as they should; false after a crash of the writer.
+        count: number of messages.
+        names: number of schemas, channels and metadata records.
     """
 
     topics: dict[int, str] = field(default_factory=dict)
@@ -41,6 +47,8 @@ class McapFile:
     messages: dict[str, list[tuple[int, bytes]]] = field(default_factory=dict)
     metadata: dict[str, dict[str, str]] = field(default_factory=dict)
     complete: bool = False
+    count: int = 0
+    names: int = 0
 
 
 def read_mcap(path: str | Path) -> McapFile:
@@ -52,7 +60,7 @@ def read_mcap(path: str | Path) -> McapFile:
         InputError: not such a file, or damaged.
     """
     path = Path(path)
-    data = _read(path)
+    data = read_regular(path, _MAX_BYTES)
     if data[: len(MAGIC)] != MAGIC:
         raise InputError(path, "", "another kind of file", "an MCAP log")
     found, names = McapFile(), {}
@@ -63,15 +71,6 @@ def read_mcap(path: str | Path) -> McapFile:
         where = f"a damaged record ({type(error).__name__})"
         raise InputError(path, "", where, "an undamaged MCAP log") from error
     return found
-
-
-def _read(path: Path) -> bytes:
-    try:
-        if path.stat().st_size > _MAX_BYTES:
-            raise InputError(path, "", "a huge file", "a log of at most 512 MiB")
-        return path.read_bytes()
-    except OSError as error:
-        raise InputError(path, "", error.strerror, "a readable file") from error
 
 
 def _records(data: bytes, found: McapFile | None) -> Iterator[tuple[int, bytes]]:
@@ -93,6 +92,10 @@ def _records(data: bytes, found: McapFile | None) -> Iterator[tuple[int, bytes]]
 def _take(
     kind: int, body: bytes, found: McapFile, names: dict[int, str], path: Path
 ) -> None:
+    found.names += kind in (SCHEMA, CHANNEL, METADATA)
+    if found.names > _MAX_NAMES or found.count > _MAX_MESSAGES:
+        valid = f"at most {_MAX_MESSAGES} messages and {_MAX_NAMES} names"
+        raise InputError(path, "", "more", valid)
     if kind == SCHEMA:
         (number,) = struct.unpack_from("<H", body)
         names[number], _ = _text(body, 2)
@@ -108,6 +111,7 @@ def _take(
         for inner, message in _records(_chunk(body, path), None):
             if inner != MESSAGE:
                 raise InputError(path, "", f"record {inner} in a chunk", "messages")
+            found.count += 1
             number, _, time_ns, _ = _MESSAGE_HEAD.unpack_from(message)
             data = message[_MESSAGE_HEAD.size :]
             found.messages[found.topics[number]].append((time_ns, data))

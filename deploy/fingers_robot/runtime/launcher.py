@@ -1,9 +1,11 @@
-"""The console's process: starts the other two, watches them, and is the guard.
+"""The console's end of a run: starts the other processes and watches over them.
 
-It holds neither driver nor policy. When the supervisor's process dies or falls silent,
-it is killed and the hand is opened once more, only to de-energize it.
+It holds neither driver nor policy. The guard is started first and ends last. When the
+supervisor's process dies or falls silent, it is killed, and the guard opens the hand
+once more to de-energize it; where the guard has gone as well, this process does that.
 """
 
+import contextlib
 import json
 import os
 import select
@@ -16,23 +18,32 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from fingers_deploy.bundle import load_bundle
+from fingers_robot.runtime.console import ALIVE, ALIVE_S
 from fingers_robot.runtime.guard import guard_hand
+from fingers_robot.runtime.guard_link import WatchedEnd
 from fingers_robot.runtime.link import make_link
+from fingers_robot.runtime.systemd import notify
 from fingers_robot.waiting import waiting
 
 SILENCE_S = 1.0
 START_S = 30.0
 FINISH_S = 6.0  # settling, and the hand's confirmation
-LAST_S = 20.0  # that, the guard, and the end of the policy's process
-EXIT_CRASH, EXIT_TRIP, EXIT_PREFLIGHT = 1, 5, 6
+GUARD_S = 9.0  # what the guard takes at most
+LAST_S = 20.0  # all that, and the end of the policy's process
+EXIT_CRASH, EXIT_TRIP, EXIT_PREFLIGHT, EXIT_UNKNOWN = 1, 5, 6, 7
+_DONE = (0, 2)  # of the guard: nothing to do or done, and input that all refuse
+UNKNOWN = (
+    "THE STATE OF THE HAND IS UNKNOWN: it has not confirmed that it is off. "
+    "CUT THE BATTERY"
+)
 
 
 class Launcher:
     """One run.
 
     Args:
-        options: for both processes, see `supervisor_process` and `policy_process`.
-        say: takes lines for the operator.
+        options: for all processes, see `supervisor_process` and `policy_process`.
+        say: takes lines for the operator; never waits.
     """
 
     def __init__(self, options: Mapping[str, Any], say: Callable[[str], None]):
@@ -43,17 +54,25 @@ class Launcher:
         supervisor, policy = make_link()
         self._console, console = make_link()
         self._console.setblocking(False)
+        supervised, by_guard = make_link()
+        mine, with_console = make_link()
+        self._guard_end = WatchedEnd(mine)
         text = json.dumps(options)
+        self.guard = _start("guard_process", text, by_guard, with_console)
         self.policy = _start("policy_process", text, policy)
-        self.supervisor = _start("supervisor_process", text, supervisor, console)
+        ends = supervisor, console, supervised
+        self.supervisor = _start("supervisor_process", text, *ends)
         self._status_s = time.monotonic() + START_S
-        self._late = False
+        self._alive_s = 0.0
+        self._late = self._unguarded = False
         self._notify = os.environ.get("NOTIFY_SOCKET", "")
 
     def send(self, word: str) -> None:
-        """Sends an action of the operator: arm, stop, clear, quit, policy N."""
+        """Sends an action of the operator: arm, stop, off, clear, quit, policy N."""
         try:
             self._console.send(word.encode("ascii", "replace"))
+        except BlockingIOError:
+            return  # as much waits as the supervisor will ever take
         except OSError:
             self._say("the supervisor does not take actions")
 
@@ -64,6 +83,7 @@ class Launcher:
             if not data:
                 return False
             self._take(json.loads(data))
+        self._show(time.monotonic())
         if time.monotonic() - self._status_s > SILENCE_S:
             self._say("the supervisor is silent: killed")
             self.supervisor.kill()
@@ -71,30 +91,57 @@ class Launcher:
         return self.supervisor.poll() is None
 
     def finish(self) -> int:
-        """Waits for the end of both processes; returns the exit status of the run.
+        """Waits for the end of all processes; returns the exit status of the run.
 
         Where the supervisor did not end by itself, the guard de-energizes the hand.
         """
         self._console.close()
         if self._notify:
-            # Longer than everything that follows; no status comes any more.
+            # Longer than everything that follows; nobody beats any more.
             notify(self._notify, f"WATCHDOG_USEC={round(1e6 * LAST_S)}\nWATCHDOG=1")
-        try:
-            status = self.supervisor.wait(timeout=FINISH_S)
-        except subprocess.TimeoutExpired:
-            self.supervisor.kill()
-            status = self.supervisor.wait()
+        status = _wait(self.supervisor, FINISH_S)
         if status < 0 or status == EXIT_CRASH:
             why = signal.Signals(-status).name if status < 0 else "an error of its own"
             self._say(f"the supervisor died ({why})")
-            self._guard()
-            status = EXIT_TRIP
-        try:
-            policy = self.policy.wait(timeout=SILENCE_S)
-        except subprocess.TimeoutExpired:
-            self.policy.kill()
-            policy = self.policy.wait()
+            status = EXIT_TRIP if self._guarded() else EXIT_UNKNOWN
+        elif status == EXIT_TRIP and not self.status.get("over"):
+            status = EXIT_TRIP if self._guarded() else EXIT_UNKNOWN
+        _wait(self.guard, GUARD_S)
+        policy = _wait(self.policy, SILENCE_S)
+        if status == EXIT_UNKNOWN:
+            self._say(UNKNOWN)
         return policy if status == 0 and policy == 2 else status
+
+    def _show(self, now: float) -> None:
+        """Shows the others that this process is there, and takes the guard's report."""
+        if now - self._alive_s >= ALIVE_S:
+            self._alive_s = now
+            with contextlib.suppress(OSError):
+                self._console.send(ALIVE.encode("ascii"))
+        self._guard_end.beat(now)
+        self._guard_end.poll()
+        lost = self.guard.poll() not in (None, *_DONE) and not self._guard_end.report
+        if lost and not self._unguarded and self.supervisor.poll() is None:
+            self._unguarded = True
+            self._say("the guard died: no run goes on without it")
+            self.send("quit")
+
+    def _guarded(self) -> bool:
+        """Waits for the guard's work, or does it; whether the hand has confirmed."""
+        deadline = time.monotonic() + GUARD_S
+        end = self._guard_end
+        while end.there and not end.report and time.monotonic() < deadline:
+            end.poll()
+            time.sleep(0.005)
+        if end.report:
+            self._say(end.report)
+            return _wait(self.guard, GUARD_S) == 0
+        if not end.there and _wait(self.guard, SILENCE_S) == 0:
+            return True  # nothing was left to do
+        self.guard.kill()  # it has gone, or is stopped: two may not open the hand
+        safe, words = guard_hand(self._options["driver"], self._interface)
+        self._say(f"guard: {words}")
+        return safe
 
     def _take(self, status: dict[str, Any]) -> None:
         before, self.status = self.status, status
@@ -111,13 +158,6 @@ class Launcher:
         self._late = status["timing_warning"]
         if status["alarm"]:
             self._say("CUT THE BATTERY: the hand does not confirm that it is off")
-        if self._notify:
-            # Ready with the first status: from then on the watchdog counts.
-            notify(self._notify, "READY=1\nWATCHDOG=1")
-
-    def _guard(self) -> None:
-        _, words = guard_hand(self._options["driver"], self._interface)
-        self._say(f"guard: {words}")
 
 
 def _start(module: str, text: str, *ends: socket.socket) -> subprocess.Popen:
@@ -132,11 +172,10 @@ def _start(module: str, text: str, *ends: socket.socket) -> subprocess.Popen:
     return process
 
 
-def notify(path: str, message: str) -> None:
-    """Notifies systemd over its socket; does nothing if nobody listens."""
-    address = "\0" + path[1:] if path.startswith("@") else path
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
-        try:
-            end.sendto(message.encode("ascii"), address)
-        except OSError:
-            return
+def _wait(process: subprocess.Popen, seconds: float) -> int:
+    """Waits for the end of a process, kills it after some time; its exit status."""
+    try:
+        return process.wait(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()

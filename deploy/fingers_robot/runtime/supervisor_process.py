@@ -1,6 +1,7 @@
 """The supervisor's process: driver, supervisor, recorder; no ONNX Runtime."""
 
 import json
+import os
 import socket
 import sys
 import time
@@ -16,6 +17,7 @@ from fingers_robot.drivers.protocol import Driver
 from fingers_robot.record.recorder import Recorder
 from fingers_robot.runtime.console import ConsoleLink
 from fingers_robot.runtime.core import Core
+from fingers_robot.runtime.guard_link import WatchedEnd
 from fingers_robot.runtime.link import SupervisorEnd
 from fingers_robot.runtime.realtime import prefer_this_process, resident_mb
 from fingers_robot.runtime.signals import ignore_interrupts
@@ -67,22 +69,29 @@ class Supervisor:
             `realtime` (whether to ask for it).
         policy: link to the policy.
         console: link to the console.
+        guard: link to the guard; nothing is armed before it watches.
 
     Raises:
         InputError: a bundle, the driver or the folder is refused.
     """
 
     def __init__(
-        self, options: Mapping[str, Any], policy: socket.socket, console: socket.socket
+        self,
+        options: Mapping[str, Any],
+        policy: socket.socket,
+        console: socket.socket,
+        guard: WatchedEnd,
     ):
         bundles = [load_bundle(path) for path in options["bundles"]]
         check_together(bundles)
         interface = bundles[0].manifest.interface
-        self._console = ConsoleLink(console)
+        self._console = ConsoleLink(console, len(bundles))
+        self._guard = guard
         self._realtime = bool(options["realtime"])
         self._driver = open_driver(options["driver"], interface)
         try:
             dry = bool(options["driver"].get("dry_run")) or not self._driver.info.live
+            self._live = not dry
             limits = make_all_limits(bundles, self._driver, dry)
             per_control = round(options["loop_hz"] / interface.control_rate_hz)
             self._period_s = 1.0 / (interface.control_rate_hz * per_control)
@@ -116,26 +125,40 @@ class Supervisor:
             reported_s = ticker.start_s
             while not (self._console.quitting and self._core.over):
                 tick = ticker.wait()
-                operator = self._console.poll()
-                if self._console.selected is not None:
-                    self._core.selected = self._console.selected
-                self._core.keys = self._console.keys
-                if self._console.quitting and self._core.state.mode in ENERGIZED:
-                    operator = Operator.STOP
+                operator, refused = self._operator(tick.t_s)
                 out = self._core.tick(tick, operator)
                 tripped |= {f.id for f in self._core.state.faults}
-                if out.events or out.alarm or tick.t_s - reported_s >= STATUS_S:
+                events = (*refused, *out.events)
+                if events or out.alarm or tick.t_s - reported_s >= STATUS_S:
                     reported_s = tick.t_s
-                    self._console.report(self._status(realtime, out.events, out.alarm))
+                    self._console.report(self._status(realtime, events, out.alarm))
                 if self._console.quitting and out.alarm:
                     return 5
                 if self._driver.over:
                     over = (*out.events, "the recording is over")
                     self._console.report(self._status(realtime, over, alarm=False))
                     break
+            # Never after an error, whatever the state says: then the guard looks.
+            if self._core.over or not self._live:
+                self._guard.farewell()
         finally:
             self._close(realtime)
-        return 5 if tripped - {"OP"} else 0
+        return 5 if tripped - {"OP", "OFF"} else 0
+
+    def _operator(self, t: float) -> tuple[Operator, tuple[str, ...]]:
+        """What the operator asks for, and why it is refused here."""
+        self._guard.beat(t, os.getpid())
+        self._guard.poll()
+        operator = self._console.poll(t)
+        if self._console.selected is not None:
+            self._core.selected = self._console.selected
+        self._core.keys = self._console.keys
+        if operator == Operator.ARM and not (self._guard.ready and self._guard.there):
+            return Operator.NONE, ("arm refused: no guard watches",)
+        gone = self._console.quitting or not self._guard.there
+        if gone and self._core.state.mode in ENERGIZED and operator != Operator.OFF:
+            operator = Operator.STOP
+        return operator, ()
 
     def _close(self, realtime: str) -> None:
         self._driver.close()
@@ -189,19 +212,22 @@ def _recorder(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Runs the process: options as JSON, link to the policy, link to the console."""
-    text, policy, console = sys.argv[1:] if arguments is None else arguments
+    """Runs the process: options as JSON; links to policy, console and guard."""
+    text, *handles = sys.argv[1:] if arguments is None else arguments
     ignore_interrupts()
-    links = [socket.socket(fileno=int(handle)) for handle in (policy, console)]
+    policy, console, end = (socket.socket(fileno=int(handle)) for handle in handles)
+    guard = WatchedEnd(end)
     try:
-        supervisor = Supervisor(json.loads(text), *links)
+        supervisor = Supervisor(json.loads(text), policy, console, guard)
     except InputError as error:
+        guard.farewell()
         print(error, file=sys.stderr)
         return 2
     except OSError as error:
+        guard.farewell()
         print(f"driver: {error}", file=sys.stderr)
         return 6
-    # What this raises is nobody's input: status 1, and the console's guard takes over.
+    # What this raises is nobody's input: status 1, and the guard takes over.
     return supervisor.run()
 
 

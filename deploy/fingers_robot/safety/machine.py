@@ -191,8 +191,9 @@ def _latch(
 ) -> tuple[State, tuple[str, ...]]:
     if state.mode not in ENERGIZED:
         return state, ()
-    if inputs.operator == Operator.STOP:
-        found = found | {"OP": "asked for"}
+    asked = {Operator.STOP: "OP", Operator.OFF: "OFF"}.get(inputs.operator)
+    if asked is not None:
+        found = found | {asked: "asked for"}
     faults, lines = latch(state.faults, found, t)
     return dataclasses.replace(state, faults=faults), lines
 

@@ -51,7 +51,8 @@ RULES = {
     ),
     "L3": "more than 3 control steps skipped in a row, or 100 ms without a step",
     "L7": "the monotonic clock went backwards",
-    "OP": "the operator asked for it, or the console is gone",
+    "OP": "the operator asked for it, or the console or the guard is gone",
+    "OFF": "the operator asked for it",
 }
 """How each fault is found, in words, by row of the table."""
 
@@ -107,5 +108,6 @@ ROWS = (
     Row("L3", "loop overrun", 0.100, HOLD),
     Row("L7", "clock jump", 0.020, DISABLE),
     Row("OP", "operator stop", 0.060, SETTLE, clear="operator"),
+    Row("OFF", "operator off", 0.060, DISABLE, clear="operator"),
 )
 BY_ID = {row.id: row for row in ROWS}

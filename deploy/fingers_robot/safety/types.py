@@ -36,12 +36,16 @@ class Reaction(enum.IntEnum):
 
 
 class Operator(enum.IntEnum):
-    """An explicit action of the operator; nothing else arms or clears."""
+    """An explicit action of the operator; nothing else arms or clears.
+
+    STOP settles, then de-energizes; OFF de-energizes at once.
+    """
 
     NONE = 0
     ARM = 1
     STOP = 2
     CLEAR = 3
+    OFF = 4
 
 
 class PolicyFault(enum.IntEnum):

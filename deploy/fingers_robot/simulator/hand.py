@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
+from fingers_deploy.files import read_regular
 from fingers_deploy.rotations import multiply
 from fingers_robot.drivers.sim_packets import STATE
 from fingers_robot.simulator.command_path import CommandPath
+from fingers_robot.simulator.one_file import check_one_file
 
 HEALTH_S = 0.2
 EFFORT_AT_LIMIT_A = 1.0  # the torque limit stands for this current
@@ -136,7 +138,9 @@ def load_model(path: Path) -> mujoco.MjModel:
         InputError: the file cannot be read, is no such model, or holds numbers that no
             hand has.
     """
-    data = _read(path)
+    data = read_regular(path, _MAX_MODEL_BYTES)
+    if path.suffix != ".mjb":
+        check_one_file(data, path)
     try:
         if path.suffix == ".mjb":
             model = mujoco.MjModel.from_binary_path(str(path))
@@ -147,19 +151,6 @@ def load_model(path: Path) -> mujoco.MjModel:
         raise InputError(path, "", error, valid) from error
     _check(model, path)
     return model
-
-
-def _read(path: Path) -> bytes:
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise InputError(path, "", error.strerror, "a readable file") from error
-    if len(data) > _MAX_MODEL_BYTES:
-        raise InputError(path, "", f"{len(data)} bytes", f"at most {_MAX_MODEL_BYTES}")
-    # MuJoCo follows absolute and upward paths of includes.
-    if path.suffix != ".mjb" and (b"<include" in data or b"file=" in data):
-        raise InputError(path, "", "another file is named", "a model in one file")
-    return data
 
 
 def _check(model: mujoco.MjModel, path: Path) -> None:

@@ -40,6 +40,7 @@ def test_check_survives_a_runtime_that_dies_when_imported(
 
 
 SIM = ("--driver", "sim", "--model", "x")
+NO_MODEL = ("--driver", "sim", "--model", "nowhere.xml")
 
 
 @pytest.mark.parametrize(
@@ -60,7 +61,16 @@ SIM = ("--driver", "sim", "--model", "x")
         (["run", "BUNDLE", *SIM, "--keys", "up"], "a keyboard policy"),
         (["run", "BUNDLE", *SIM, "--keyboard", "/dev/none"], "a keyboard policy"),
         (["run", "BUNDLE", *SIM, "--tracker", "t"], "no policy that reads a camera"),
-        (["run", "BUNDLE", "--driver", "sim", "--model", "nowhere.xml"], "nowhere.xml"),
+        (["run", "BUNDLE", "--unattended", *NO_MODEL], "nowhere.xml"),
+        (["run", "BUNDLE", *SIM], "--unattended"),
+        (["run", "BUNDLE", *SIM, "--sticks", "1_0"], "no number"),
+        (["run", "BUNDLE", *SIM, "--seed", "١"], "no whole number"),
+        (["run", "BUNDLE", *SIM, "--out", ""], "empty"),
+        (["run", "BUNDLE", "--driver", "sim", "--model", ""], "empty"),
+        (["runn"], "invalid choice"),
+        (["run", "BUNDLE", "--driver", "a" * 5000], "invalid choice"),
+        (["check", "n" * 5000], "found"),
+        ([], "COMMAND"),
         (["log", "nowhere"], "nowhere"),
         (["guard", "BUNDLE", *SIM], "--socket"),
     ],
@@ -69,6 +79,7 @@ def test_bad_input_is_one_sentence_and_status_2(bundle_dir, capsys, arguments, w
     assert main([a.replace("BUNDLE", str(bundle_dir)) for a in arguments]) == 2
     said = capsys.readouterr()
     assert said.out == "" and len(said.err.splitlines()) == 1 and words in said.err
+    assert len(said.err) <= 320
 
 
 def test_damaged_bundles_are_refused_before_anything_is_opened(marching):
@@ -98,7 +109,8 @@ def test_a_bundle_that_is_an_archive_is_refused_not_unpacked(tmp_path, capsys):
 
 def _run(*arguments):
     return subprocess.run(
-        [sys.executable, "-m", "fingers_robot", *map(str, arguments)],
+        [sys.executable, "-m", "fingers_robot", *map(str, arguments)]
+        + ["--unattended"] * (arguments[0] in ("run", "record")),
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,
@@ -220,7 +232,7 @@ def test_a_terminal_that_goes_away_ends_nothing(hand_model, marching_dir):
     program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--no-record"]
     process = subprocess.Popen(
-        [*program, "--duration", "2"],
+        [*program, "--duration", "2", "--unattended"],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         stdin=subprocess.DEVNULL,
@@ -240,7 +252,7 @@ def test_a_full_disk_is_reported_at_once(hand_model, marching_dir, tmp_path):
     program = [sys.executable, "-m", "fingers_robot", "run", str(marching_dir)]
     program += ["--driver", "sim", "--model", str(hand_model), "--out", str(tmp_path)]
     done = subprocess.run(
-        [*program, "--duration", "4"],
+        [*program, "--duration", "4", "--unattended"],
         capture_output=True,
         text=True,
         stdin=subprocess.DEVNULL,

@@ -11,7 +11,7 @@ from fingers_deploy.errors import InputError
 from fingers_robot.drivers.sim import SimDriver, SimulatorProcess
 from fingers_robot.runtime.guard import make_safe
 from fingers_robot.simulator.command_path import CommandPath
-from fingers_robot.simulator.hand import SimulatedHand
+from fingers_robot.simulator.hand import SimulatedHand, load_model
 
 FREE = '<joint name="root" type="free"/>'
 HINGE = '<joint name="root" type="hinge" axis="0 0 1"/>'
@@ -144,3 +144,40 @@ def test_bad_models_are_refused_in_one_sentence(
 def test_the_process_says_why_it_refuses(interface, tmp_path):
     with pytest.raises(InputError, match="nowhere"):
         SimulatorProcess(tmp_path / "nowhere.xml", interface)
+
+
+@pytest.mark.parametrize(
+    "attribute",
+    ['file="/etc/passwd"', 'file = "x.stl"', 'fileright="x.png"', "file\n='../x.stl'"],
+)
+def test_a_model_that_names_another_file_is_refused_before_it_is_opened(
+    tmp_path, attribute
+):
+    path = tmp_path / "hand.xml"
+    path.write_text(f"<mujoco><asset><mesh name='a' {attribute}/></asset></mujoco>")
+    with pytest.raises(InputError, match="a model in one file"):
+        load_model(path)
+
+
+@pytest.mark.parametrize(
+    "inner",
+    [
+        "<replicate count='100000'><body/></replicate>",
+        "<replicate count='40'><replicate count='40'/></replicate>",
+        "<body>" * 200 + "</body>" * 200,
+        "<geom/>" * 20_001,
+        "<hfield nrow='1000000' ncol='2'/>",
+    ],
+)
+def test_a_model_that_is_endless_is_refused(tmp_path, inner):
+    path = tmp_path / "hand.xml"
+    path.write_text(f"<mujoco><worldbody>{inner}</worldbody></mujoco>")
+    with pytest.raises(InputError, match="at most"):
+        load_model(path)
+
+
+def test_a_document_type_is_refused(tmp_path):
+    path = tmp_path / "hand.xml"
+    path.write_text('<!DOCTYPE a [<!ENTITY b "c">]><mujoco>&b;</mujoco>')
+    with pytest.raises(InputError, match="document type"):
+        load_model(path)

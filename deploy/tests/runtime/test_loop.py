@@ -1,7 +1,6 @@
 import dataclasses
 import os
 import signal
-import socket
 import subprocess
 import sys
 
@@ -10,9 +9,8 @@ import pytest
 
 from fingers_robot.behaviour.exchange import Answer, Query, padded
 from fingers_robot.drivers.open import _OPENERS
-from fingers_robot.runtime.console import ConsoleLink
+from fingers_robot.runtime.console import ALIVE, SILENCE_S, ConsoleLink
 from fingers_robot.runtime.guard import guard_hand
-from fingers_robot.runtime.launcher import notify
 from fingers_robot.runtime.link import (
     ANSWER,
     PolicyEnd,
@@ -203,24 +201,71 @@ def test_partial_answers_keep_their_length():
 
 def test_console_actions_and_its_loss():
     left, right = make_link()
-    console = ConsoleLink(left)
-    assert console.poll() == Operator.NONE
+    console = ConsoleLink(left, policies=4)
+    assert console.poll(0.0) == Operator.NONE
     for word in ("policy 3", "nonsense", "arm"):
         right.send(word.encode())
-    assert console.poll() == Operator.ARM and console.selected == 3
+    assert console.poll(0.0) == Operator.ARM and console.selected == 3
     console.report({"mode": "active"})
     assert right.recv(100) == b'{"mode": "active"}'
     right.close()
-    assert console.poll() == Operator.STOP and console.quitting
+    assert console.poll(0.0) == Operator.STOP and console.quitting
 
 
 @pytest.mark.parametrize("later", ["clear", "arm", "status"])
-def test_a_stop_outlasts_what_is_typed_after_it(later):
+@pytest.mark.parametrize(
+    ("word", "asked"), [("stop", Operator.STOP), ("off", Operator.OFF)]
+)
+def test_a_stop_outlasts_what_is_typed_after_it(word, asked, later):
     left, right = make_link()
     console = ConsoleLink(left)
-    for word in ("arm", "stop", later):
-        right.send(word.encode())
-    assert console.poll() == Operator.STOP
+    for each in ("arm", word, later):
+        right.send(each.encode())
+    assert console.poll(0.0) == asked
+
+
+@pytest.mark.parametrize("words", [("stop", "off"), ("off", "stop"), ("off", "quit")])
+def test_off_is_more_than_stop(words):
+    left, right = make_link()
+    console = ConsoleLink(left)
+    for each in words:
+        right.send(each.encode())
+    assert console.poll(0.0) == Operator.OFF
+
+
+@pytest.mark.parametrize(
+    "word",
+    [
+        *("policy 2", "policy 2147483648", "policy -1", "policy ²", "policy"),
+        *("policy 1_0", "key", "key x", "\x00", "policy " + "9" * 60_000),
+    ],
+)
+def test_words_that_no_console_sends_change_nothing(word):
+    left, right = make_link()
+    console = ConsoleLink(left, policies=2)
+    right.send(word.encode())
+    assert console.poll(0.0) == Operator.NONE
+    assert console.selected is None and not console.keys
+
+
+def test_a_console_that_falls_silent_is_gone():
+    left, right = make_link()
+    console = ConsoleLink(left)
+    assert console.poll(100.0) == Operator.NONE  # one that has not begun is not silent
+    right.send(ALIVE.encode())
+    assert console.poll(101.0) == Operator.NONE
+    assert console.poll(101.0 + SILENCE_S) == Operator.NONE
+    assert console.poll(101.1 + SILENCE_S) == Operator.STOP and console.quitting
+
+
+def test_keys_that_wait_are_bounded():
+    left, right = make_link()
+    console = ConsoleLink(left)
+    for _ in range(10):
+        for _ in range(60):
+            right.send(b"key up")
+        console.poll(0.0)
+    assert len(console.keys) == 64
 
 
 def test_an_impossible_number_of_joints_is_none():
@@ -240,15 +285,6 @@ def test_a_hand_that_cannot_be_opened_is_said_to_need_its_battery_cut(
     monkeypatch.setitem(_OPENERS, "sim", gone)
     safe, words = guard_hand({"kind": "sim"}, interface)
     assert not safe and "gave up" in words and "CUT THE BATTERY" in words
-
-
-def test_systemd_is_found(tmp_path):
-    path = str(tmp_path / "notify")
-    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
-        end.bind(path)
-        notify(path, "WATCHDOG=1")
-        assert end.recv(100) == b"WATCHDOG=1"
-    notify(str(tmp_path / "nobody"), "WATCHDOG=1")
 
 
 _PREFER = """
@@ -284,7 +320,10 @@ def test_what_was_obtained_is_reported(case):
         assert said == "SCHED_FIFO 50" if obtained else "no real-time" in said
 
 
-@pytest.mark.parametrize("number", ["SIGINT", "SIGTERM"])
+@pytest.mark.parametrize(
+    "number",
+    ["SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP", "SIGTTIN", "SIGTTOU"],
+)
 def test_an_interrupt_does_not_reach_the_hand_first(number):
     program = (
         "import os, signal;"

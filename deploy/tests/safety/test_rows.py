@@ -145,7 +145,7 @@ SCENARIOS = {
     "S18 empty": _proposal(target_rad=lambda p: p.target_rad[:0]),
     "L3 skipped": _always(skipped_ticks=4),
 }  # fmt: skip
-OTHER_TESTS = {"S5 stall", "S8b", "S17", "S20", "L7", "OP"}
+OTHER_TESTS = {"S5 stall", "S8b", "S17", "S20", "L7", "OP", "OFF"}
 
 
 def test_every_row_has_a_test():
@@ -395,3 +395,23 @@ def test_wiggle_finds_a_wrong_hand(make_rig, kind, words):
 
     assert _arm_with(rig, _reading(pos_rad=wrong)) == {"S17"}
     assert any(words in line for line in rig.events)
+
+
+@pytest.mark.parametrize("settling", [False, True])
+def test_off_de_energizes_at_once_whatever_it_does(make_rig, settling):
+    rig = make_rig()
+    rig.activate()
+    if settling:
+        rig.tick(Operator.STOP)
+        rig.run(0.2)
+        assert rig.state.mode == Mode.STOPPING
+    rig.tick(Operator.OFF)
+    assert rig.state.mode == Mode.SAFE and rig.out.enable is False
+    assert rig.out.target_rad is None
+
+
+def test_off_changes_nothing_that_is_off(make_rig):
+    rig = make_rig()
+    rig.run(0.1)
+    rig.tick(Operator.OFF)
+    assert rig.state.mode == Mode.DISABLED and rig.state.faults == ()

@@ -1,0 +1,63 @@
+"""Words on the command line: a mistake is one sentence, and nothing is guessed."""
+
+import argparse
+import re
+from collections.abc import Iterator
+from typing import Any, NoReturn
+
+from fingers_deploy.errors import shortened
+
+_LONGEST = 200  # of a sentence, without how to get help
+_NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf|nan", re.ASCII)
+_WHOLE = re.compile(r"[-+]?(\d+|0[xX][0-9a-fA-F]+)", re.ASCII)
+
+
+class UsageError(Exception):
+    """Words on the command line that do not fit, in one sentence."""
+
+
+class Parser(argparse.ArgumentParser):
+    """Puts a mistake into one sentence and leaves the exit to `main`.
+
+    Args:
+        options: as `argparse.ArgumentParser`; half a name is none.
+    """
+
+    def __init__(self, **options: Any):
+        super().__init__(**{"allow_abbrev": False, **options})
+
+    def error(self, message: str) -> NoReturn:
+        """Raises the mistake."""
+        raise UsageError(f"{shortened(message, _LONGEST)} (see {self.prog} --help)")
+
+
+def whole(text: str) -> int:
+    """A whole number of plain digits: `1_0` and digits of other scripts are none."""
+    if not _WHOLE.fullmatch(text) or len(text) > 20:
+        raise argparse.ArgumentTypeError(f"{shortened(text)!r} is no whole number")
+    return int(text, 0) if "x" in text.lower() else int(text)
+
+
+def number(text: str) -> float:
+    """A number of plain digits, as `whole`."""
+    if not _NUMBER.fullmatch(text) or len(text) > 40:
+        raise argparse.ArgumentTypeError(f"{shortened(text)!r} is no number")
+    return float(text)
+
+
+def refuse_empty(options: argparse.Namespace) -> None:
+    """Refuses options that were given an empty text, which must not count as none.
+
+    Raises:
+        UsageError: naming the option.
+    """
+    for name, value in _texts(vars(options)):
+        if not value.strip():
+            raise UsageError(f"{name}: found an empty text; valid: a text, or nothing")
+
+
+def _texts(options: dict[str, Any]) -> Iterator[tuple[str, str]]:
+    for name, value in options.items():
+        for entry in value if isinstance(value, list | tuple) else (value,):
+            if isinstance(entry, str):
+                yield f"--{name.replace('_', '-')}", entry
