@@ -20,7 +20,16 @@ from fingers_mjx.cli.installation import (
     check_places,
 )
 
-COMMANDS = ("train", "evaluate", "sweep", "compare", "export", "play", "hand")
+COMMANDS = (
+    "train",
+    "evaluate",
+    "steer",
+    "sweep",
+    "compare",
+    "export",
+    "play",
+    "hand",
+)
 SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 

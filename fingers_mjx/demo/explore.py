@@ -18,44 +18,19 @@ from fingers_mjx.evaluation.evaluate import (
     Progress,
     evaluate,
 )
+from fingers_mjx.evaluation.wrapped import Wrapped
 from fingers_mjx.policy.actor import Network, acting
 
 
 @dataclass(frozen=True)
-class Exploring:
+class Exploring(Wrapped):
     """Worlds that add noise to every action, drawn from each world's own stream.
 
     Attributes:
-        env: the worlds.
         noise_std: standard deviation of the noise, one per action or for all.
     """
 
-    env: BatchEnv
     noise_std: Any
-
-    @property
-    def num_envs(self) -> int:
-        """Number of worlds."""
-        return self.env.num_envs
-
-    @property
-    def action_size(self) -> int:
-        """Number of policy outputs."""
-        return self.env.action_size
-
-    @property
-    def observation_size(self) -> dict[str, int]:
-        """Sizes of the observations."""
-        return self.env.observation_size
-
-    @property
-    def dt(self) -> float:
-        """Control interval [s]."""
-        return self.env.dt
-
-    def reset(self, key: Array) -> State:
-        """Starts an episode in every world."""
-        return self.env.reset(key)
 
     def step(self, state: State, action: Float[Array, "b a"]) -> State:
         """Advances every world under the action and its noise."""

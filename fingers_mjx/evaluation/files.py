@@ -101,6 +101,26 @@ def summary_document(
     }
 
 
+def by_kind(
+    found: Sequence[Mapping[str, float]], episodes: int, seed: int
+) -> list[dict[str, Any]]:
+    """Returns summaries of measures, for each kind of episodes apart.
+
+    Args:
+        found: measures of every episode, `episodes` of each kind in turn.
+        episodes: of each kind.
+        seed: of the resampling.
+    """
+    kinds = [found[i : i + episodes] for i in range(0, len(found), episodes)]
+    return [
+        {
+            name: _plain(summarize(np.array([one[name] for one in kind]), seed=seed))
+            for name in kind[0]
+        }
+        for kind in kinds
+    ]
+
+
 def write_summary(path: Path, document: Mapping[str, object]) -> Path:
     """Writes the summary as JSON, without the non-standard NaN and Infinity."""
     text = json.dumps(document, indent=2, allow_nan=False) + "\n"

@@ -82,7 +82,7 @@ def load_policy(path: Path) -> Policy:
 
 @flax.struct.dataclass
 class _Weights:
-    """A network as arrays of JAX, a pytree."""
+    """A network as a pytree of arrays."""
 
     mean: Float[np.ndarray | Array, " n"]
     std: Float[np.ndarray | Array, " n"]
@@ -95,11 +95,8 @@ def acting(network: Network) -> Partial:
     What is compiled with it serves every network of the same sizes: its numbers are
     arguments and not constants.
     """
-    layers = [
-        (jnp.asarray(kernel), jnp.asarray(bias)) for kernel, bias in network.layers
-    ]
-    mean, std = jnp.asarray(network.mean), jnp.asarray(network.std)
-    return Partial(_act_on, _Weights(mean, std, tuple(layers)))
+    own = _Weights(network.mean, network.std, network.layers)
+    return Partial(_act_on, jax.tree.map(jnp.asarray, own))
 
 
 def _act_on(weights: _Weights, obs: Mapping[str, Array]) -> Array:

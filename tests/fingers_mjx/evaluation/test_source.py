@@ -23,6 +23,8 @@ from fingers_mjx.evaluation.source import (
 )
 from fingers_mjx.policy.source import PolicySource
 
+NETWORK = SimpleNamespace(mean=np.zeros(1), std=np.ones(1), layers=())
+
 
 def table(duration, speed):
     columns = {"duration_s": duration, "task_speed_mps": speed}
@@ -84,7 +86,7 @@ def test_an_evaluation_without_all_contacts_has_no_result(monkeypatch, column, s
     fields |= {"done": done, "failed": done, "overflow": dropped, "extra": {}}
     table = EpisodeTable({}, Trace(**fields), 0.02)
     monkeypatch.setattr(module, "evaluate", lambda *args: table)
-    source = PolicySource(Path("run"), make_setup(), None, 0)
+    source = PolicySource(Path("run"), make_setup(), NETWORK, 0)
     dropped[3, 1, column] = True
     assert evaluate_source(source, 3) is table
     dropped[1, 1, column] = True

@@ -1,0 +1,1 @@
+"""Steering: what a policy makes of fixed commands, and how it holds a heading."""
