@@ -53,6 +53,8 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.studies.comparison.page import PAGE_FILE, write_page
     from fingers_mjx.studies.comparison.results import read_results
     from fingers_mjx.studies.sweep.manifest import read_manifest
+    from fingers_mjx.studies.sweep.promote import choosing
+    from fingers_mjx.studies.sweep.resolve import saved_sweep
 
     manifest = read_manifest(args.sweep)
     if args.baseline is None:
@@ -60,7 +62,8 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--baseline", "", "nothing", f"one of {names}")
     out: Path = args.out or args.sweep / "comparison"
     options.check_directory("--out", out)
-    results = read_results(args.sweep, manifest)
+    chose = choosing(saved_sweep(args.sweep), manifest)
+    results = read_results(args.sweep, manifest, chose)
     if not args.allow_partial:
         check_complete(results, args.sweep)
     comparison = compared(results, args.baseline, args.measures)

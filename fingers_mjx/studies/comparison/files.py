@@ -34,6 +34,7 @@ def document(comparison: Comparison) -> dict[str, Any]:
         "read_together": len(comparison.rows),
         "commit": commit_here(),
         "evaluation": dict(results.conditions),
+        "chose": {k: list(v) for k, v in comparison.results.chose.items()},
         "missing": [dataclasses.asdict(missing) for missing in comparison.missing],
         "differences": [dataclasses.asdict(row) for row in comparison.rows],
         "arms": [dataclasses.asdict(cell) for cell in comparison.cells],

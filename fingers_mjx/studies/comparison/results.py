@@ -3,8 +3,9 @@
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
+from types import MappingProxyType
 from typing import Any
 
 from envs.errors import InputError
@@ -47,6 +48,8 @@ class Results:
         steps: configuration and seed to the control steps behind the policy.
         missing: members without an evaluation.
         conditions: what all evaluations share.
+        chose: configuration to the seeds that chose it, which are in none of the above
+            (`fingers_mjx.studies.sweep.promote.choosing`).
     """
 
     task: str
@@ -55,6 +58,7 @@ class Results:
     steps: Mapping[str, Mapping[int, int]]
     missing: tuple[Missing, ...]
     conditions: Mapping[str, Any]
+    chose: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     def seeds(self, configuration: str) -> set[int]:
         """Seeds that the sweep has of a configuration, done or not."""
@@ -79,12 +83,17 @@ class Results:
         )
 
 
-def read_results(root: Path, manifest: Manifest) -> Results:
+def read_results(
+    root: Path,
+    manifest: Manifest,
+    chose: Mapping[str, tuple[int, ...]] = MappingProxyType({}),
+) -> Results:
     """Reads the evaluations of all members that are done.
 
     Args:
         root: directory of the sweep.
         manifest: its members.
+        chose: configuration to the seeds that chose it, which are left out.
 
     Raises:
         InputError: a name that is no name of a directory, or evaluations that were made
@@ -97,6 +106,8 @@ def read_results(root: Path, manifest: Manifest) -> Results:
     steps: dict[str, dict[int, int]] = {}
     missing, first = [], None
     for member in manifest.members:
+        if member.seed in chose.get(member.configuration, ()):
+            continue
         found = _summary(root, manifest, member)
         if isinstance(found, str):
             missing.append(Missing(member.configuration, member.seed, found))
@@ -116,6 +127,7 @@ def read_results(root: Path, manifest: Manifest) -> Results:
         steps=steps,
         missing=tuple(missing),
         conditions=shared,
+        chose=chose,
     )
 
 

@@ -106,7 +106,15 @@ def notes(comparison: Comparison) -> list[str]:
     family = f"{together} comparisons read together: p, Holm is corrected for all."
     alone = "One comparison: there is nothing to correct for."
     said = [family if together > 1 else alone]
-    return [*said, *_few(comparison), *_dropped(comparison)]
+    return [*said, *_chose(comparison), *_few(comparison), *_dropped(comparison)]
+
+
+def _chose(comparison: Comparison) -> list[str]:
+    """Which seeds have chosen what, and do not count for it."""
+    return [
+        f"Left out, since they chose {name}: seeds {_listed(seeds)}."
+        for name, seeds in comparison.results.chose.items()
+    ]
 
 
 def _few(comparison: Comparison) -> list[str]:

@@ -40,6 +40,23 @@ def promoted(spec: Sweep, root: Path, manifest: Manifest) -> list[Key]:
     return [Key(name, seed) for seed in more for name in best]
 
 
+def choosing(spec: Sweep | None, manifest: Manifest) -> dict[str, tuple[int, ...]]:
+    """Returns, of each configuration that was promoted, the seeds that chose it.
+
+    The best of many is chosen for its luck too: on the seeds that chose it a
+    configuration looks better than it is.
+
+    Args:
+        spec: resolved; None if it is not known.
+        manifest: members of the sweep.
+    """
+    if spec is None or spec.promote is None:
+        return {}
+    chose = seed_list(spec.seeds)
+    more = {m.configuration for m in manifest.members if m.seed not in chose}
+    return {name: chose for name in manifest.configurations if name in more}
+
+
 def check_promotion(spec: Sweep, source: Path) -> Better:
     """Returns which direction of the measure is better, by which is promoted.
 

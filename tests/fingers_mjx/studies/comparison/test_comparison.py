@@ -126,3 +126,18 @@ def test_nothing_done_is_not_compared(tmp_path):
 def test_one_configuration_cannot_be_compared(tmp_path):
     with pytest.raises(InputError, match="two configurations"):
         compared(results(tmp_path, study({})), "base")
+
+
+def test_seeds_that_chose_a_configuration_do_not_count_for_it(tmp_path):
+    """Of five seeds the first two chose it, and are the best ones: for their luck."""
+    lucky = study({"lift": [0.2, 0.2, 0.0, 0.01, -0.01]})
+    path = write_sweep(tmp_path / "s", lucky, curves=False)
+    manifest = read_manifest(path)
+    found = compared(read_results(path, manifest, {"lift": (0, 1)}), "base", [SPEED])
+    [row] = found.rows
+    assert row.difference.n == 3
+    assert row.difference.mean == pytest.approx(0.0, abs=1e-6)
+    assert sorted(found.cell("lift", SPEED).values) == [2, 3, 4]
+    assert "Left out, since they chose lift: seeds 0, 1." in notes(found)
+    naive = compared(read_results(path, manifest), "base", [SPEED])
+    assert naive.rows[0].difference.mean == pytest.approx(0.08, abs=1e-6)

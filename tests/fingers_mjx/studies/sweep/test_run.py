@@ -11,13 +11,22 @@ from pathlib import Path
 
 import pytest
 from support import sweep_setup
-from support.sweep_setup import journal, plan_faults, run_fake, states, summaries
+from support.sweep_setup import (
+    journal,
+    plan_faults,
+    run_fake,
+    states,
+    summaries,
+    sweep,
+)
 
 from envs.errors import InputError
 from fingers_mjx.runs.directory import locked
 from fingers_mjx.studies.sweep.manifest import read_manifest
 from fingers_mjx.studies.sweep.outcome import is_evaluated
+from fingers_mjx.studies.sweep.promote import choosing
 from fingers_mjx.studies.sweep.report import report
+from fingers_mjx.studies.sweep.resolve import saved_sweep
 from fingers_mjx.studies.sweep.run import SweepFull, SweepStopped, sweep_lock
 
 FAULTS = {
@@ -107,6 +116,8 @@ def test_the_best_configurations_are_trained_on_more_seeds(tmp_path):
     manifest = run_fake(tmp_path, promote=promote)
     more = [str(m.key) for m in manifest.members if m.seed > 1]
     assert more == ["lift/2", "lift/3"]
+    assert choosing(saved_sweep(tmp_path), manifest) == {"lift": (0, 1)}
+    assert choosing(sweep(), manifest) == choosing(None, manifest) == {}
     assert set(states(manifest).values()) == {"done"}
     again = run_fake(tmp_path, promote=promote)
     assert again == manifest
