@@ -20,6 +20,12 @@ from envs.randomize import RandomizeConfig
 from envs.signals import Signals
 from rewards import RewardTable
 
+UNIT = "unit"
+"""Measure of an episode that numbers what it belongs to; units are independent.
+
+Where a task has it, an evaluation averages over each unit first.
+"""
+
 
 @dataclass(frozen=True)
 class HandSettings:

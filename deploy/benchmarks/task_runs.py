@@ -39,6 +39,8 @@ from fingers_robot.safety import Mode, Operator
 POLICIES = WALKING.parent
 CAMERA_S, LATE_S, CONTROL_S = 1 / 60, 0.04, 0.02
 ENTER_M = 0.02
+EVERY_FALL = 6
+"""Every so many falls that training never saw are tried."""
 FALLEN_RAD, LEVEL_RAD, STOPS = 0.7, 0.17, 24
 
 
@@ -190,7 +192,7 @@ def get_up(folder: Path, number: int) -> dict:
         folder: for the model.
         number: of the fallen pose.
     """
-    env, falls = make_batch("recovery", 1), load_falls()
+    env, falls = make_batch("recovery", 1), load_falls(held_out=True)
     path = folder / "recovery.mjb"
     mujoco.mj_saveModel(env.mj_model, str(path), None)
     both = tuple(load_bundle(POLICIES / name) for name in ("crawl", "recovery"))
@@ -246,7 +248,10 @@ def main() -> int:
             "push, S5 and S8b off": [
                 push_cube(folder, k, watched=False) for k in range(options.trials)
             ],
-            "recovery": [get_up(folder, k) for k in range(len(load_falls().side))],
+            "recovery": [
+                get_up(folder, k)
+                for k in range(0, len(load_falls(held_out=True).side), EVERY_FALL)
+            ],
             "stop at full speed": [
                 stop_walking(folder, wait_s, STOPS) for wait_s in (0.0, 0.5)
             ],

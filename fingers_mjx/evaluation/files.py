@@ -1,6 +1,7 @@
 """Files of an evaluation: per-episode Parquet table and JSON summary, each atomic."""
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +13,7 @@ import pyarrow.parquet as pq
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
+from envs.task import UNIT
 from fingers_mjx.evaluation.stats import Summary, summarize
 
 SUMMARY_FILE, TABLE_FILE = "summary.json", "episodes.parquet"
@@ -78,7 +80,9 @@ def summary_document(
     Keys: task, policy, episodes, seed, steps_trained, commit (if known) and measures,
     which maps each name to mean, std, n, low and high (95 % interval of the mean),
     median and p95 (95 % of the episodes are at most there). An undefined number, such
-    as the mean of no episodes, is None.
+    as the mean of no episodes, is None. Where the task numbers independent units
+    (`envs.task.UNIT`), these numbers are over means of each unit, and their number is
+    in "units".
 
     Args:
         columns: measure name to one value per episode.
@@ -88,17 +92,41 @@ def summary_document(
         steps_trained: environment steps behind the policy.
         commit: version of the code.
     """
-    known = {} if commit is None else {"commit": commit}
+    known: dict[str, object] = {} if commit is None else {"commit": commit}
+    episodes = len(next(iter(columns.values())))
+    if UNIT in columns:
+        columns = over_units(columns)
+        known["units"] = len(next(iter(columns.values())))
     measures = {name: _plain(summarize(v, seed=seed)) for name, v in columns.items()}
     return {
         "task": task,
         "policy": policy,
-        "episodes": len(next(iter(columns.values()))),
+        "episodes": episodes,
         "seed": seed,
         "steps_trained": steps_trained,
         **known,
         "measures": measures,
     }
+
+
+def over_units(columns: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Returns one value per unit of each measure: the mean of its defined values.
+
+    Args:
+        columns: measure name to one value per episode, `UNIT` among them.
+    """
+    units = np.unique(columns[UNIT])
+    own = [columns[UNIT] == unit for unit in units]
+    return {
+        name: np.array([_mean(values[which]) for which in own])
+        for name, values in columns.items()
+        if name != UNIT
+    }
+
+
+def _mean(values: np.ndarray) -> float:
+    known = values[~np.isnan(values)]
+    return float(known.mean()) if len(known) else math.nan
 
 
 def by_kind(

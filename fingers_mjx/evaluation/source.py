@@ -56,9 +56,10 @@ def nominal(setup: Setup) -> Setup:
 def as_deployed(setup: Setup) -> Setup:
     """Returns `setup` with what the shim does beside the policy.
 
-    Of a recovery it is the end: detector and ramp (`envs.tasks.recovery.settle`).
+    Of a recovery it is the end: detector and ramp (`envs.tasks.recovery.settle`). It
+    starts from poses that training has not seen.
     """
-    return _with_fields(setup, settle=True)
+    return _with_fields(setup, settle=True, falls="held_out")
 
 
 def without_practice(setup: Setup) -> Setup:

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Num, Shaped
 
+from envs.task import UNIT
 from envs.tasks.recovery.falls import SIDES
 from envs.tasks.recovery.settle import UPRIGHT_TILT_DEG
 
@@ -22,8 +23,9 @@ def recovery_measures(
     `righted` is 1 if the detector fired and the hand is still level (tilt < 10°) when
     the episode ends, `time_to_upright_s` the time at which the detector fired, its
     0.5 s included, and `final_joint_error_rad` = Σ_j |q_j − q*_j|/20 at the end. The
-    last two are NaN where the detector did not fire, the last one also where the ramp
-    was not over by the end of the episode.
+    last two of them are NaN where the detector did not fire, the last one also where
+    the ramp was not over by the end of the episode. `unit` is the number of the pose:
+    episodes from one pose are not independent.
 
     Args:
         recorded: the signals over the control steps, see `Recovery.scene_signals` in
@@ -44,7 +46,8 @@ def recovery_measures(
         "time_to_upright_s": jnp.where(done, jnp.argmax(fired) * dt_s, jnp.nan),
         "final_joint_error_rad": jnp.where(settled, error, jnp.nan),
     }
-    return found | _per_side(found, recorded["fall_side"][0])
+    pose = recorded["fall_pose"][0].astype(jnp.float32)
+    return found | _per_side(found, recorded["fall_side"][0]) | {UNIT: pose}
 
 
 def _per_side(

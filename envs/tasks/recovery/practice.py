@@ -23,13 +23,16 @@ from envs.hand.hand_file import HandFile
 from envs.hand.model import build_model
 from envs.hand.stance import Stance
 from envs.tasks.recovery.falls import (
+    OTHER_PER_SIDE,
     Falls,
+    load_falls,
+    settle_falls,
+)
+from envs.tasks.recovery.lying import (
     clearance_m,
     curl,
     down_b,
-    falls_of,
     lie_down,
-    load_falls,
     rounded,
     turned_down,
 )
@@ -74,7 +77,8 @@ def settle_practice(hand: HandFile, stance: Stance) -> Poses:
     tilt is within 5 degrees of that wanted, which grows from pose to pose, and nothing
     reaches into the floor. `SINKING` poses, up to 70 degrees, begin with joint targets
     up to 1.3 rad from the stance's, leaning by up to 1 rad. `TIPPING` poses, from 70
-    degrees to the farthest fall, begin between stance and a fall.
+    degrees to the farthest of `OTHER_PER_SIDE` falls on each side, begin between stance
+    and one of these.
 
     Args:
         hand: the hand file.
@@ -85,7 +89,7 @@ def settle_practice(hand: HandFile, stance: Stance) -> Poses:
     """
     model, rng = build_model(hand), np.random.default_rng(_SEED)
     draws = [partial(_sink, rng, model, stance)] * SINKING
-    falls = falls_of(hand, stance)
+    falls = settle_falls(hand, stance, OTHER_PER_SIDE)
     level = down_b(np.array(stance.qpos))
     farthest = max(_angle(down_b(np.array(q)), level) for q in falls.qpos)
     draws += [partial(_tip, rng, model, stance, falls)] * TIPPING

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import flax.struct
 import jax
@@ -53,11 +53,13 @@ class RecoveryConfig(HandSettings):
         practice_fraction: share of training episodes that start from a practice pose
             (`envs.tasks.recovery.practice`) instead of a fall (ours). With `settle`
             there are none.
+        falls: which poses episodes start from; evaluations take the others (ours).
     """
 
     command: CommandConfig = field(default_factory=_no_command)
     settle: bool = False
     practice_fraction: float = field(default=0.0, metadata={"low": 0.0, "high": 1.0})
+    falls: Literal["training", "held_out"] = "training"
     # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
     # 14 contacts under random actions, and Warp's pool also holds the near pairs.
     contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
@@ -72,10 +74,12 @@ class RecoveryMemory:
     """What an episode carries.
 
     Attributes:
+        pose: number of the fall.
         side: side on which the hand fell, a position in `SIDES`.
         settling: upright detector and settle ramp.
     """
 
+    pose: Int[Array, "*b"]
     side: Int[Array, "*b"]
     settling: Settling
 
@@ -108,7 +112,8 @@ class Recovery(HandTask):
         wanted = config.practice_fraction > 0.0 and not config.settle
         practice = practice_of(hand, stance) if wanted else ()
         middle_b = hand.nominal.palm.inertial_pos
-        return cls(config, stance, falls_of(hand, stance), middle_b, practice)
+        falls = falls_of(hand, stance, config.falls == "held_out")
+        return cls(config, stance, falls, middle_b, practice)
 
     def begin_episode(
         self, key: PRNGKeyArray, world: PerWorldState, state: PhysicsState
@@ -116,10 +121,10 @@ class Recovery(HandTask):
         """The command of the whole episode, the side of the fall, and no settling."""
         del world, state
         sides = jnp.array([list(SIDES).index(side) for side in self.falls.side])
-        settling = start_settling(len(self.stance.target_rad))
+        settling, pose = start_settling(len(self.stance.target_rad)), self._drawn(key)
         return {
             "command": sample_command(key, self.config.command),
-            "task": RecoveryMemory(sides[self._drawn(key)], settling),
+            "task": RecoveryMemory(pose, sides[pose], settling),
         }
 
     def start(
@@ -155,7 +160,7 @@ class Recovery(HandTask):
         Returns:
             `tilt_rad_v`, the tilt θ, and `joint_error_rad` = mean |q − q*|, both [rad];
             `settling`, 1 once the upright detector has fired, `settled`, 1 once the
-            ramp is over, and `fall_side`, a position in `SIDES` [1].
+            ramp is over; `fall_side`, in `SIDES`, and `fall_pose`, numbers [1].
 
         Source:
             Paper, fall recovery.
@@ -170,6 +175,7 @@ class Recovery(HandTask):
             "settling": memory.settling.begun.astype(jnp.float32),
             "settled": settled.astype(jnp.float32),
             "fall_side": memory.side,
+            "fall_pose": memory.pose,
         }
 
     def magnitudes(

@@ -62,3 +62,23 @@ def test_summary_has_what_readers_rely_on(tmp_path):
     }
     assert measures["mean_contact_tilt_deg"] == undefined
     assert "commit" not in summary_document(COLUMNS, "crawl", "bundle", 3, 1_000)
+
+
+def test_episodes_of_one_unit_count_once():
+    """Of three poses one was drawn six times: it says no more for that."""
+    columns = {
+        "righted": np.array([0.0] * 6 + [1.0, 1.0]),
+        "time_s": np.array([np.nan] * 6 + [2.0, 4.0]),
+        "unit": np.array([5.0] * 6 + [1.0, 2.0]),
+    }
+    found = summary_document(columns, "recovery", "p", 0, 1)
+    assert (found["episodes"], found["units"]) == (8, 3)
+    assert set(found["measures"]) == {"righted", "time_s"}
+    assert found["measures"]["righted"]["mean"] == pytest.approx(2 / 3)
+    assert found["measures"]["righted"]["n"] == 3
+    assert found["measures"]["time_s"]["mean"] == 3.0
+    without = {k: v for k, v in columns.items() if k != "unit"}
+    plain = summary_document(without, "recovery", "p", 0, 1)
+    assert "units" not in plain
+    assert plain["measures"]["righted"]["mean"] == 0.25
+    assert plain["measures"]["righted"]["high"] < found["measures"]["righted"]["high"]

@@ -179,3 +179,4 @@ def test_play_and_evaluation_start_from_falls_alone(recovery, setup, monkeypatch
     assert main(["play", str(recovery.source), "--randomize"]) == 2
     assert made[0].practice_fraction == 0.0
     assert as_deployed(trained).env.settle
+    assert as_deployed(trained).env.falls == "held_out"

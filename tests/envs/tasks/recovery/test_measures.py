@@ -18,6 +18,7 @@ def episode(fired=None, settled=None, tilt_deg=3.0, side=0, error_rad=0.25):
         "tilt_rad_v": jnp.full(STEPS, np.radians(tilt_deg)),
         "joint_error_rad": jnp.linspace(1.0, error_rad, STEPS),
         "fall_side": jnp.full(STEPS, side),
+        "fall_pose": jnp.full(STEPS, 7),
     }
 
 
@@ -35,7 +36,8 @@ def test_a_hand_that_gets_up_and_settles(side, name):
         assert found[f"time_to_upright_s{suffix}"] == pytest.approx(0.8)
         assert found[f"final_joint_error_rad{suffix}"] == 0.25
     assert all(np.isnan(v) for k, v in found.items() if k.endswith(other))
-    assert len(found) == 9
+    assert found["unit"] == 7
+    assert len(found) == 10
 
 
 def test_a_hand_that_the_detector_never_saw_upright():
