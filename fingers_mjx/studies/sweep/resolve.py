@@ -178,9 +178,9 @@ def _addable(spec: Sweep, name: str) -> dict[Any, Any]:
 
 
 def _changed(source: Path, field: str, found: Any, was: Any) -> InputError:
-    shown = [json.dumps(x, default=list) for x in (found, was)]
+    shown = [shortened(json.dumps(x, default=list), 50) for x in (found, was)]
     valid = (
-        f"{shortened(shown[1], 50)}, as the sweep was begun: seeds and configurations can be added, "
+        f"{shown[1]}, as the sweep was begun: seeds and configurations can be added, "
         "nothing taken away or changed; another directory takes another sweep"
     )
     return InputError(source, field, shown[0], valid)
