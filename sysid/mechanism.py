@@ -17,6 +17,7 @@ from envs.actuator.catalogue import effect_kind
 from envs.config.typed import load_yaml
 from envs.errors import InputError, one_of
 from envs.hand.hand_file import HandFile, load_hand_file
+from envs.hand.importing.files import check_files
 from envs.hand.model import build_spec
 from envs.hand.nominal import FINGERS, vendor_hand
 from envs.physics.quiet_mujoco import mujoco
@@ -124,8 +125,10 @@ def mjcf_mechanism(mjcf: str | Path, drive: str | Path) -> Mechanism:
         InputError: a file that cannot be read, a joint that is in one of them only.
     """
     try:
-        model = mujoco.MjModel.from_xml_path(str(mjcf))
+        model = mujoco.MjModel.from_xml_path(str(check_files(mjcf)))
     except (ValueError, OSError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(mjcf, "", error, "an MJCF file") from error
     return model_mechanism(model, load_yaml(DriveFile, drive).joints, mjcf)
 

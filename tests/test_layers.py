@@ -15,11 +15,14 @@ from support.house import PACKAGES, ROOT
 MAY_IMPORT = {
     "rewards": (),
     "envs": ("rewards", "fingers_deploy"),
-    "sysid": ("rewards", "envs"),
+    "sysid": ("rewards", "envs", "fingers_deploy"),
     "fingers_mjx": ("rewards", "envs", "sysid", "fingers_deploy", "fingers_robot"),
     "fingers_deploy": (),
     "fingers_robot": ("fingers_deploy",),
-    "benchmarks": ("rewards", "envs", "sysid", "fingers_mjx"),
+    "benchmarks": (
+        *("rewards", "envs", "sysid"),
+        *("fingers_mjx", "fingers_deploy", "fingers_robot"),
+    ),
     "deploy/benchmarks": ("envs", "fingers_mjx", "fingers_deploy", "fingers_robot"),
 }
 OURS = {name for name in MAY_IMPORT if "/" not in name}

@@ -31,18 +31,25 @@ CONDITIONS = ("plain", "flood", "full disk", "policy stopped", "loaded machine")
 WITHIN_S = 0.100
 _SMALL = 200_000  # bytes that a run may write where the disk is full
 _PER_RUN = 50
+_ARM_S = 10.0
+
+
+class NotArmed(RuntimeError):
+    """The hand cannot be armed, which says nothing about stops."""
 
 
 def rearm(run: ConsoleRun, hand: WatchedHand, rng: np.random.Generator) -> None:
     """Brings the hand from off to energized, and waits a random time.
 
+    A hand that was switched off in the middle of its ramp may have fallen over.
+
     Raises:
-        TimeoutError: it cannot be armed.
+        NotArmed: it cannot be armed.
     """
-    deadline = time.monotonic() + 60.0
+    deadline = time.monotonic() + _ARM_S
     while not hand.energized:
         if time.monotonic() > deadline:
-            raise TimeoutError(f"not armed: {run.lines[-20:]}")
+            raise NotArmed(f"{run.lines[-5:]}")
         run.type("clear\n")
         time.sleep(0.03)
         t = run.type("arm\n")
@@ -69,9 +76,10 @@ def measure(
         if word == "off":
             return _until_off(hand, typed_s)
         began_s = run.wait_for("OP operator stop", 10.0, typed_s)
-        while hand.energized:
-            time.sleep(0.02)
-        return began_s - typed_s
+        off_s = _until_off(hand, typed_s)
+        return began_s - typed_s if off_s < np.inf else np.inf
+    except TimeoutError:
+        return np.inf
     finally:
         if paused:
             run.signal(signal.SIGCONT, "policy")
@@ -84,6 +92,17 @@ def _until_off(hand: WatchedHand, typed_s: float) -> float:
             return off_s
         time.sleep(0.005)
     return np.inf
+
+
+def _some(hand, run, word, condition, rng, took: list[float], trials: int) -> None:
+    """Adds trials of one run, until the hand has fallen and cannot be armed."""
+    for number in range(min(_PER_RUN, trials - len(took))):
+        try:
+            took.append(measure(hand, run, word, condition, rng))
+        except NotArmed:
+            if number == 0:
+                raise
+            return
 
 
 def measure_condition(
@@ -110,10 +129,7 @@ def measure_condition(
                 ):
                     if full:
                         run.wait_for("NOT RECORDING", 60.0)
-                    count = min(_PER_RUN, trials - len(took))
-                    took += [
-                        measure(hand, run, word, condition, rng) for _ in range(count)
-                    ]
+                    _some(hand, run, word, condition, rng, took, trials)
     finally:
         for process in hogs:
             process.kill()

@@ -1,14 +1,27 @@
-"""Run an exported policy bundle: numpy, with ONNX Runtime where it is installed."""
+"""Run an exported policy bundle: numpy, with ONNX Runtime where it is installed.
 
-from fingers_deploy.action import ActionTransform
-from fingers_deploy.bundle import Bundle, load_bundle
-from fingers_deploy.controller import PolicyController
-from fingers_deploy.errors import BundleError
-from fingers_deploy.manifest import Manifest
-from fingers_deploy.network import NumpyPolicy
-from fingers_deploy.observation import ObservationAssembler
-from fingers_deploy.policy import OnnxPolicy, load_policy
+A name is imported when it is first used: reading files and errors takes no NumPy.
+"""
 
+import importlib
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from fingers_deploy.action import ActionTransform
+    from fingers_deploy.bundle import Bundle, load_bundle
+    from fingers_deploy.controller import PolicyController
+    from fingers_deploy.errors import BundleError
+    from fingers_deploy.manifest import Manifest
+    from fingers_deploy.network import NumpyPolicy
+    from fingers_deploy.observation import ObservationAssembler
+    from fingers_deploy.policy import OnnxPolicy, load_policy
+
+_PLACES = (
+    "action.ActionTransform bundle.Bundle bundle.load_bundle errors.BundleError "
+    "controller.PolicyController manifest.Manifest network.NumpyPolicy "
+    "observation.ObservationAssembler policy.OnnxPolicy policy.load_policy"
+)
+_HOMES = {name: home for home, name in (p.split(".") for p in _PLACES.split())}
 __all__ = [
     "ActionTransform",
     "Bundle",
@@ -21,3 +34,9 @@ __all__ = [
     "load_bundle",
     "load_policy",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(importlib.import_module(f"{__name__}.{_HOMES[name]}"), name)

@@ -44,7 +44,10 @@ def shortened(value: object, limit: int = _FOUND) -> str:
 
     What is left out is in the middle: two paths often differ in their ends.
     """
-    text = str(value)
+    try:
+        text = str(value)
+    except (RecursionError, UnicodeError):
+        text = f"a {type(value).__name__} that cannot be shown"
     half = limit // 2
     if len(text) > 4 * limit:  # before anything is done with each character
         text = f"{text[: 2 * limit]}…{text[-2 * limit :]}"

@@ -40,13 +40,13 @@ def open_regular(
         if isinstance(problem, InputError):
             raise
         raise error(path, "", reason(problem), valid) from problem
-    found = os.fstat(
-        file.fileno()
-    )  # of the file that was opened, whatever came between
-    if stat.S_ISREG(found.st_mode) and found.st_size <= most:
+    found = os.fstat(file.fileno())  # of what was opened, whatever came between
+    sound = stat.S_ISREG(found.st_mode) and _answers(file.fileno())
+    if sound and found.st_size <= most:
         return file
     file.close()
-    raise error(path, "", f"{found.st_size} bytes", valid)
+    kind = f"{found.st_size} bytes" if sound else "a special file"
+    raise error(path, "", kind, valid)
 
 
 def read_regular(
@@ -84,6 +84,15 @@ def reason(problem: Exception) -> str:
 def size_text(count: int) -> str:
     """A number of bytes in words."""
     return f"{count >> 20} MiB" if count >= 1 << 20 else f"{count >> 10} KiB"
+
+
+def _answers(handle: int) -> bool:
+    """Whether reading returns; files of the kernel call themselves regular as well."""
+    try:
+        os.pread(handle, 1, 0)
+    except OSError:
+        return False
+    return True
 
 
 def _without_waiting(path: str, flags: int) -> int:

@@ -21,6 +21,13 @@ READERS = {
 }
 
 
+def test_a_file_of_the_kernel_that_would_wait_is_special():
+    if not os.access("/proc/kmsg", os.R_OK):
+        pytest.skip("only the administrator may open it")
+    with pytest.raises(InputError, match=r"found a special file|not permitted"):
+        read_regular("/proc/kmsg", 100)
+
+
 @pytest.fixture(params=["pipe", "link to a pipe", "/dev/zero", "link to /dev/zero"])
 def special(request, tmp_path):
     pipe, link = tmp_path / "pipe", tmp_path / "link"

@@ -11,6 +11,8 @@ import yaml
 
 from envs.errors import InputError
 
+MAX_YAML_BYTES = 1 << 18
+MAX_YAML_NODES = 20_000
 MAX_YAML_DEPTH = 32
 
 _RESOLVERS = (  # YAML 1.2 core schema: name, pattern, possible first characters
@@ -30,16 +32,24 @@ def parse_yaml(text: str, source: object) -> Any:
     """Returns the plain data in YAML text.
 
     Raises:
-        InputError: not strict YAML; names line and column.
+        InputError: not strict YAML, which names line and column, or too much of it:
+            reading YAML takes a second for some ten thousand values.
     """
+    if len(text) > MAX_YAML_BYTES:
+        raise InputError(source, "", f"{len(text)} characters", _MOST)
     try:
         _refuse_features(text)
         return _Loader(text).get_single_data()
-    except yaml.YAMLError as error:
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
         mark = getattr(error, "problem_mark", None)
         where = f" at line {mark.line + 1}, column {mark.column + 1}" if mark else ""
         problem = f"{getattr(error, 'problem', None) or error}{where}"
         raise InputError(source, "", problem, "strict YAML") from error
+
+
+_MOST = f"at most {MAX_YAML_BYTES >> 10} KiB of YAML with {MAX_YAML_NODES} values"
+_NO_TEXT = re.compile(r"[\ud800-\udfff\x00-\x08\x0b-\x1f\x7f]")
+"""Characters that no file can hold as UTF-8 or that no name has."""
 
 
 def write_yaml(data: Any) -> str:
@@ -90,8 +100,13 @@ _Loader.add_constructor("tag:yaml.org,2002:int", _construct_int)
 
 def _refuse_features(text: str) -> None:
     """Refuses anchors, aliases, tags and deep nesting before anything is built."""
-    depth = 0
+    depth = nodes = 0
     for event in yaml.parse(text, Loader=_Loader):
+        nodes += isinstance(event, yaml.NodeEvent)
+        if nodes > MAX_YAML_NODES:
+            raise _yaml_error(f"more than {MAX_YAML_NODES} values", event)
+        if _NO_TEXT.search(getattr(event, "value", "")):
+            raise _yaml_error("a character that is no text", event)
         depth += isinstance(event, yaml.CollectionStartEvent)
         depth -= isinstance(event, yaml.CollectionEndEvent)
         if depth > MAX_YAML_DEPTH:

@@ -11,12 +11,12 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any, TypeVar
 
-from envs.config.strict_yaml import parse_yaml, write_yaml
+from envs.config.strict_yaml import MAX_YAML_BYTES, parse_yaml, write_yaml
 from envs.errors import InputError, one_of
 from fingers_deploy.decode import Place, Rules, decode, describe, init_fields
+from fingers_deploy.files import read_regular
 
 T = TypeVar("T")
-MAX_YAML_BYTES = 1 << 20
 
 
 def limits(unit: str, low: float, high: float) -> dict[str, Any]:
@@ -61,13 +61,10 @@ def load_yaml(cls: type[T], path: str | Path) -> T:
     Raises:
         InputError: as `from_dict`; unreadable, too large, not UTF-8, not strict YAML.
     """
+    content = read_regular(path, MAX_YAML_BYTES)
     try:
-        with open(path, "rb") as stream:
-            content = stream.read(MAX_YAML_BYTES + 1)
-        if len(content) > MAX_YAML_BYTES:
-            raise ValueError(f"more than {MAX_YAML_BYTES} bytes")
         text = content.decode("utf-8")
-    except (OSError, ValueError) as error:
+    except ValueError as error:
         raise InputError(path, "", error, "a UTF-8 file of strict YAML") from error
     return from_dict(cls, parse_yaml(text, path), path)
 

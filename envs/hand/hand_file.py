@@ -64,7 +64,7 @@ class HandFile:
     payload_size: Vector = field(metadata=limits("m", 0.001, 0.3))
     stiffness_scale: JointQuantity = field(metadata=limits("1", 0.01, 1000.0))
     damping_scale: JointQuantity = field(metadata=limits("1", 0.0, 1000.0))
-    torque_scale: JointQuantity = field(metadata=limits("1", 0.0, 10.0))
+    torque_scale: JointQuantity = field(metadata=limits("1", 0.001, 10.0))
     speed_limit: JointQuantity = field(metadata=limits("rad/s", 0.01, 100.0))
     delay_s: Quantity = field(metadata=limits("s", 0.0, 0.2))
     lowpass_hz: Quantity = field(metadata=limits("Hz", 0.05, 1000.0))

@@ -11,14 +11,15 @@ import os
 import sys
 import warnings
 from collections.abc import Sequence
-from typing import NoReturn
 
+from fingers_deploy.errors import shortened
 from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
 from fingers_mjx.cli.installation import (
     UnsupportedInstallation,
     check_installation,
     check_places,
 )
+from fingers_robot.cli.parser import Parser, UsageError, refuse_empty
 
 COMMANDS = (
     "train",
@@ -45,26 +46,14 @@ _EXTRAS = {
 }
 
 
-class UsageError(Exception):
-    """Words on the command line that do not fit, in one sentence."""
-
-
-class _Parser(argparse.ArgumentParser):
-    """Puts a mistake into one sentence and leaves the exit to `main`."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message} (see {self.prog} --help)")
-
-
 def make_parser() -> argparse.ArgumentParser:
     """Returns the parser of all commands; each names its function in `args.run`."""
-    parser = _Parser(
+    parser = Parser(
         prog="fingers",
         description="Teach an anthropomorphic hand to walk on its fingertips.",
         epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 5 members "
         "of a sweep missing, 6 an installation that cannot work, 75 stopped by a "
         "signal after saving (go on with --resume).",
-        allow_abbrev=False,
     )
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
@@ -93,6 +82,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         check_places()
         args = make_parser().parse_args(argv)
+        refuse_empty(args)
+        args.check(args)
         check_installation()
         _note_idle_gpu(args)
         _prepare_jax()
@@ -144,7 +135,7 @@ def _sentence(error: Exception) -> str:
         return f'{error.name} is not installed; pip install "fingers-mjx[{extra}]"'
     if isinstance(error, OSError) and error.filename:
         valid = "a path that can be read and written"
-        return f"{error.filename}: found {error.strerror}; valid: {valid}"
+        return f"{shortened(error.filename)}: found {error.strerror}; valid: {valid}"
     return " ".join(str(error).split())
 
 

@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
+from fingers_deploy.errors import shortened
+from fingers_deploy.files import is_folder
 from fingers_mjx.cli.gpu import install_command
+from fingers_robot.cli.parser import plain_number, plain_whole
 
 if TYPE_CHECKING:
     from fingers_mjx.ppo.config import TrainConfig
@@ -41,7 +44,7 @@ def command(
     parser = commands.add_parser(
         name, help=summary, description=details, allow_abbrev=False
     )
-    parser.set_defaults(run=run, computes=computes)
+    parser.set_defaults(run=run, computes=computes, check=lambda args: None)
     return parser
 
 
@@ -49,14 +52,12 @@ def whole(low: int, high: int | None = None) -> Callable[[str], int]:
     """Returns a converter to whole numbers from `low` to `high`."""
 
     def convert(text: str) -> int:
-        try:
-            value = int(text)
-        except ValueError:
-            value = None
+        value = plain_whole(text)
         if value is None or value < low or (high is not None and value > high):
             limit = f" and at most {high}" if high is not None else ""
             raise argparse.ArgumentTypeError(
-                f"found {text}; valid: a whole number of at least {low}{limit}"
+                f"found {shortened(text)}; valid: a whole number of at least "
+                f"{low}{limit}"
             )
         return value
 
@@ -67,14 +68,11 @@ def number(low: float = -math.inf) -> Callable[[str], float]:
     """Returns a converter to finite numbers of at least `low`."""
 
     def convert(text: str) -> float:
-        try:
-            value = float(text)
-        except ValueError:
-            value = math.nan
-        if not (math.isfinite(value) and value >= low):
+        value = plain_number(text)
+        if value is None or not (math.isfinite(value) and value >= low):
             limit = f" of at least {low:g}" if low > -math.inf else ""
             raise argparse.ArgumentTypeError(
-                f"found {text}; valid: a finite number{limit}"
+                f"found {shortened(text)}; valid: a finite number{limit}"
             )
         return value
 
@@ -83,7 +81,14 @@ def number(low: float = -math.inf) -> Callable[[str], float]:
 
 def path(parser, *names: str, metavar: str = "FILE", **how) -> None:
     """Adds an option or an argument whose values are paths."""
-    parser.add_argument(*names, type=Path, metavar=metavar, **how)
+    parser.add_argument(*names, type=_path, metavar=metavar, **how)
+
+
+def _path(text: str) -> Path:
+    """A path; an empty text would be the folder in which one stands."""
+    if not text.strip():
+        raise argparse.ArgumentTypeError("found an empty text; valid: a path")
+    return Path(text)
 
 
 def value(parser, name: str, kind: Callable, default: float, what: str) -> None:
@@ -153,7 +158,7 @@ def check_file(option: str, path: Path | None) -> None:
     """
     if path is None:
         return
-    if path.is_dir():
+    if is_folder(path):
         raise InputError(option, "", f"{path}, a directory", "a file to write")
     _check_place(option, path, path.absolute().parent)
 
@@ -164,8 +169,12 @@ def check_directory(option: str, path: Path | None) -> None:
     Raises:
         InputError: naming what is in the way.
     """
-    if path is not None:
-        _check_place(option, path, path.absolute())
+    if path is None:
+        return
+    is_folder(path)
+    if path.absolute().resolve() == Path(path.absolute().anchor):
+        raise InputError(option, "", path, "a folder other than that of everything")
+    _check_place(option, path, path.absolute())
 
 
 def _check_place(option: str, path: Path, directory: Path) -> None:

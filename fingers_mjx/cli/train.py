@@ -35,6 +35,7 @@ def add(commands) -> None:
         "Train a policy. Shows progress live on a terminal, as JSON lines otherwise. "
         "SIGINT saves and stops; --resume goes on.",
     )
+    parser.set_defaults(check=check)
     parser.add_argument("task", metavar="TASK", nargs="?", help="such as crawl")
     parser.add_argument(
         "--preset",
@@ -71,6 +72,25 @@ def add(commands) -> None:
         help="after --warm-start, whether reward schedules go on from the steps that "
         "the run has done; default restart",
     )
+
+
+def check(args: argparse.Namespace) -> None:
+    """Refuses sizes that no machine or not this one has room for, before JAX loads.
+
+    Raises:
+        InputError: naming the setting, or what all of them need.
+    """
+    from envs.config.typed import override
+    from fingers_mjx.ppo.config import check_config, preset
+    from fingers_mjx.training.memory import check_memory
+
+    if args.resume is not None or args.preset == "adapt":
+        return  # sizes that have been trained with
+    rest = [x for x in args.settings if not x.startswith("env.")]
+    _check_words(rest)
+    config = override(preset(args.preset or "cpu"), rest)
+    check_config(config, "--set")
+    check_memory(config, args.seeds or 1)
 
 
 def run(args: argparse.Namespace) -> int:

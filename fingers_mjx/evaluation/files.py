@@ -14,8 +14,10 @@ import pyarrow.parquet as pq
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from envs.task import UNIT
+from fingers_deploy.files import open_regular
 from fingers_mjx.evaluation.stats import Summary, summarize
 
+MAX_TABLE_BYTES = 1 << 28
 SUMMARY_FILE, TABLE_FILE = "summary.json", "episodes.parquet"
 
 
@@ -61,8 +63,9 @@ def read_table(path: Path) -> dict[str, np.ndarray]:
         InputError: the file is missing or is not a Parquet file.
     """
     try:
-        table = pq.read_table(path)
-    except (OSError, pa.ArrowInvalid) as error:
+        with open_regular(path, MAX_TABLE_BYTES) as file:
+            table = pq.ParquetFile(file).read()
+    except (OSError, pa.ArrowException) as error:
         raise InputError(path, "", error, "a Parquet table of episodes") from error
     return {name: table[name].to_numpy() for name in table.column_names}
 

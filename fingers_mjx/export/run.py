@@ -1,11 +1,10 @@
 """From a run directory to a bundle that can be evaluated and played anywhere."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 from envs.batch import BatchEnv
 from envs.config.atomic_file import write_atomic
+from envs.config.json_file import read_table
 from envs.errors import InputError
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx.evaluation.files import SUMMARY_FILE
@@ -87,20 +86,18 @@ def _evaluation(path: Path, steps: int) -> dict[str, float] | None:
     """Returns the means of the run's last evaluation, if it is of this checkpoint."""
     if not path.exists():
         return None
-    summary = _json(path)
+    summary = read_table(path)
     if summary.get("steps_trained") != steps:
         return None
-    means = {name: m["mean"] for name, m in summary["measures"].items()}
+    try:
+        means = {name: m["mean"] for name, m in summary["measures"].items()}
+    except (LookupError, TypeError, AttributeError) as error:
+        raise InputError(path, "measures", error, "what fingers eval writes") from error
     return {name: mean for name, mean in means.items() if mean is not None}
 
 
 def _versions(path: Path) -> dict[str, str]:
-    packages: dict[str, str] = _json(path)["packages"]
+    packages = read_table(path).get("packages")
+    if not isinstance(packages, dict):
+        raise InputError(path, "packages", packages, "what fingers train writes")
     return packages
-
-
-def _json(path: Path) -> dict[str, Any]:
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise InputError(path, "", error, "the file that fingers writes") from error

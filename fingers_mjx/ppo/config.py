@@ -9,7 +9,7 @@ from envs.errors import InputError, one_of
 
 POSITIVE = 1e-9
 """Lower bound of numbers that must be above zero."""
-MAX_WORLDS, MAX_ITERATIONS = 2**20, 10**7
+MAX_WORLDS, MAX_ITERATIONS, MAX_SIZE = 2**20, 10**7, 2**16
 """Bounds beyond any machine, within which no counter of 32 bits overflows."""
 SMALL_MEAN_SCALE = 0.01
 """`init_mean_scale` of policies that hardly act at the start (ours)."""
@@ -61,9 +61,9 @@ class PpoConfig:
             (ours).
     """
 
-    unroll_length: int = _number(24, 1)
-    epochs: int = _number(5, 1)
-    minibatches: int = _number(4, 1)
+    unroll_length: int = _number(24, 1, MAX_SIZE)
+    epochs: int = _number(5, 1, MAX_SIZE)
+    minibatches: int = _number(4, 1, MAX_WORLDS)
     clip: float = _number(0.2, POSITIVE)
     discount: float = _number(0.99, 0.0, 1.0)
     gae_lambda: float = _number(0.95, 0.0, 1.0)
@@ -74,13 +74,13 @@ class PpoConfig:
     learning_rate_max: float = _number(1e-2, POSITIVE)
     desired_kl: float = _number(0.01, POSITIVE)
     max_grad_norm: float = _number(1.0, POSITIVE)
-    actor_layers: tuple[int, ...] = _number((512, 256, 128), 1)
-    critic_layers: tuple[int, ...] = _number((512, 256, 128), 1)
+    actor_layers: tuple[int, ...] = _number((512, 256, 128), 1, MAX_SIZE)
+    critic_layers: tuple[int, ...] = _number((512, 256, 128), 1, MAX_SIZE)
     init_noise_std: float = _number(1.0, POSITIVE)
     init_mean_scale: float = _number(1.0, POSITIVE)
     noise_std_type: Literal["log", "scalar"] = "log"
     reward_scale: float = _number(1.0, POSITIVE)
-    max_bad_updates: int = _number(4, 1)
+    max_bad_updates: int = _number(4, 1, MAX_ITERATIONS)
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,10 @@ class TrainConfig:
     backend: str = "cpu"
     num_envs: int = _number(4096, 1, MAX_WORLDS)
     iterations: int = _number(8000, 1, MAX_ITERATIONS, free=True)
-    iterations_per_call: int = _number(1, 1)
-    log_every: int = _number(10, 1, free=True)
-    checkpoint_every: int = _number(200, 1, free=True)
-    keep_checkpoints: int = _number(3, 1, free=True)
+    iterations_per_call: int = _number(1, 1, MAX_ITERATIONS)
+    log_every: int = _number(10, 1, MAX_ITERATIONS, free=True)
+    checkpoint_every: int = _number(200, 1, MAX_ITERATIONS, free=True)
+    keep_checkpoints: int = _number(3, 1, MAX_ITERATIONS, free=True)
     on_overflow: Literal["stop", "warn"] = _free("stop")
     hang_limit_s: float = _number(300.0, POSITIVE, free=True)
     ppo: PpoConfig = dataclasses.field(default_factory=PpoConfig)

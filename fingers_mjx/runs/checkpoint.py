@@ -17,6 +17,7 @@ import numpy as np
 import orbax.checkpoint as ocp
 
 from envs.config.atomic_file import sync
+from envs.config.json_file import read_table
 from envs.errors import InputError
 from fingers_mjx.runs.files import OutOfSpace, room_for
 from fingers_mjx.runs.seal import problem, seal
@@ -172,7 +173,7 @@ def load(path: Path) -> Saved:
     fault = problem(path, int(path.name))
     if fault:
         raise InputError(path, "", fault, "a complete checkpoint")
-    meta = json.loads((path / "meta.json").read_text(encoding="utf-8"))
+    meta = read_table(path / "meta.json")
     with ocp.PyTreeCheckpointer() as reader:
         stored = reader.restore((path / "state").absolute())
     empty = {name: np.zeros(shape) for name, shape in meta["empty"].items()}

@@ -21,9 +21,11 @@ from pathlib import Path
 from typing import Any
 
 from envs.config.atomic_file import PARTIAL
+from envs.config.json_file import read_table
 from envs.config.typed import dump_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, hand_yaml
+from fingers_deploy.files import is_folder
 from fingers_mjx.runs.files import write_whole
 
 FORMAT = 1
@@ -143,13 +145,14 @@ def _check_purpose(path: Path, resume: bool) -> None:
 
 def _read_run(path: Path) -> dict[str, Any]:
     """Returns `run.json` of a complete run directory of this format."""
-    try:
-        run = json.loads((path / RUN_FILE).read_text(encoding="utf-8"))
-        complete = (path / CONFIG_FILE).exists()
-    except (OSError, ValueError):
-        run, complete = {}, False
-    if not (complete and isinstance(run, dict)):
+    is_folder(path)
+    if not all((path / name).exists() for name in (RUN_FILE, CONFIG_FILE)):
         raise InputError(path, "", "no run", "a directory made by fingers train")
+    try:
+        run = read_table(path / RUN_FILE)
+    except InputError as error:
+        valid = "the file of a run, made by fingers train"
+        raise InputError(path / RUN_FILE, "", error.found, valid) from error
     if run.get("format") != FORMAT:
         found = run.get("format", "nothing")
         raise InputError(path / RUN_FILE, "format", found, str(FORMAT))

@@ -11,11 +11,15 @@ from tensorboardX.proto.event_pb2 import Event  # pyright: ignore
 from tensorboardX.proto.summary_pb2 import Summary  # pyright: ignore
 from tensorboardX.record_writer import RecordWriter
 
+from envs.errors import InputError
+from fingers_deploy.errors import shortened
+from fingers_deploy.files import open_regular, read_regular
 from fingers_mjx.runs.files import room_for, write_whole
 
 Row = Mapping[str, Any]
 _STEP, _TIME = "iteration", "time_s"
 _TAIL_BYTES = 1 << 16
+MAX_BYTES = 1 << 28
 
 
 class MetricsLog:
@@ -68,15 +72,25 @@ class MetricsLog:
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
-    """Returns the rows of a `metrics.jsonl`, up to the first line that is cut short."""
+    """Returns the rows of a `metrics.jsonl`, up to the first line that is cut short.
+
+    Raises:
+        InputError: no regular file, or a line that is no row.
+    """
     rows: list[dict[str, Any]] = []
     if not path.exists():
         return rows
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
+    text = read_regular(path, MAX_BYTES).decode(errors="replace")
+    for number, line in enumerate(text.splitlines(), start=1):
         try:
-            rows.append(json.loads(line))
-        except ValueError:
+            value = json.loads(line)
+        except (ValueError, RecursionError):
             break
+        row = _row(value)
+        if row is None or type(row.get(_TIME)) not in (int, float):
+            found = shortened(line)
+            raise InputError(path, f"line {number}", found, "a row that training wrote")
+        rows.append(row)
     return rows
 
 
@@ -84,17 +98,28 @@ def last_row(path: Path) -> dict[str, Any]:
     """Returns the last whole row of a `metrics.jsonl`, empty if there is none.
 
     Only the end of the file is read.
+
+    Raises:
+        InputError: no regular file.
     """
     if not path.exists():
         return {}
-    with path.open("rb") as file:
+    with open_regular(path, MAX_BYTES) as file:
         file.seek(max(0, path.stat().st_size - _TAIL_BYTES))
-        lines = file.read().decode(errors="replace").splitlines()
+        lines = file.read(_TAIL_BYTES).decode(errors="replace").splitlines()
     for line in reversed(lines):
-        with suppress(ValueError):
-            if isinstance(row := json.loads(line), dict):
+        with suppress(ValueError, RecursionError):
+            if (row := _row(json.loads(line))) is not None:
                 return row
     return {}
+
+
+def _row(value: Any) -> dict[str, Any] | None:
+    """Returns what a line holds if it is a row: flat, with its iteration."""
+    if not (isinstance(value, dict) and type(value.get(_STEP)) is int):
+        return None
+    flat = all(x is None or isinstance(x, int | float | str) for x in value.values())
+    return value if flat else None
 
 
 def _line(row: Row) -> str:

@@ -7,8 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from envs.config.atomic_file import sync
+from fingers_deploy.files import read_regular
 
 NAME = "manifest.json"
+_MAX_BYTES = 1 << 24
 
 
 def seal(directory: Path, step: int) -> None:
@@ -31,12 +33,14 @@ def problem(directory: Path, step: int) -> str:
     Every deleted, added, truncated or altered file is found, the manifest included.
     """
     try:
-        content = (directory / NAME).read_bytes()
+        content = read_regular(directory / NAME, _MAX_BYTES)
         manifest = json.loads(content)["manifest"]
         if content != _encode(manifest) or manifest["step"] != step:
             return f"{NAME} was altered"
-    except (OSError, ValueError, KeyError, TypeError):
+    except (OSError, ValueError, KeyError, TypeError, RecursionError):
         return f"{NAME} is missing or unreadable"
+    if odd := _special(directory):
+        return odd
     names = {str(p.relative_to(directory)) for p in _files(directory)} - {NAME}
     for name in sorted(names ^ manifest["files"].keys()):
         return f"{name} is {'not in the manifest' if name in names else 'missing'}"
@@ -49,6 +53,12 @@ def problem(directory: Path, step: int) -> str:
 def _files(directory: Path) -> Iterator[Path]:
     """Yields the files in `directory`, at any depth, in order."""
     return (p for p in sorted(directory.rglob("*")) if not p.is_dir())
+
+
+def _special(directory: Path) -> str:
+    """Names what is neither file nor folder, which nobody may open."""
+    odd = (p for p in _files(directory) if not p.is_file())
+    return next((f"{p.relative_to(directory)} is no regular file" for p in odd), "")
 
 
 def _entry(path: Path) -> dict[str, Any]:

@@ -11,10 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from envs.batch import BatchEnv
+from envs.config.strict_yaml import MAX_YAML_BYTES
 from envs.config.typed import load_yaml, override
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from envs.registry import get_task, make_batch
+from fingers_deploy.files import read_regular
 from fingers_mjx.ppo.config import TrainConfig, check_config
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
 
@@ -42,7 +44,8 @@ def run_setup(run_dir: Path) -> Setup:
     Raises:
         InputError: no run directory, one of another version, or an unknown task.
     """
-    task = saved_bound(run_dir).get("train", {}).get("task")
+    train = saved_bound(run_dir).get("train")
+    task = train.get("task") if isinstance(train, dict) else None
     if not isinstance(task, str):
         raise InputError(run_dir / RUN_FILE, "bound.train.task", task, "a task")
     return load_setup(run_dir / CONFIG_FILE, run_dir / HAND_FILE, task)
@@ -117,11 +120,7 @@ def config_digest(directory: Path) -> str:
     """
     digest = hashlib.sha256()
     for name in (CONFIG_FILE, HAND_FILE):
-        try:
-            digest.update((directory / name).read_bytes())
-        except OSError as error:
-            valid = "the file that training and export write there"
-            raise InputError(directory / name, "", error.strerror, valid) from error
+        digest.update(read_regular(directory / name, MAX_YAML_BYTES))
     return digest.hexdigest()
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from envs.config.json_file import read_json
 from envs.config.typed import to_dict
 from envs.errors import InputError
 from fingers_mjx.ppo.state import Carry
@@ -91,7 +92,7 @@ def read_end(path: Path) -> Diverged | None:
     if not file.exists():
         return None
     try:
-        found = json.loads(file.read_text(encoding="utf-8"))
+        found = read_json(file)
         good = found["checkpoint"]
         return Diverged(
             found["term"],
@@ -101,4 +102,6 @@ def read_end(path: Path) -> Diverged | None:
             path / "checkpoints" / good if good else None,
         )
     except (ValueError, KeyError, TypeError) as error:
+        if isinstance(error, InputError):
+            raise
         raise InputError(file, "", error, "the file that training writes") from error

@@ -18,7 +18,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.stats import t as student
 
-from envs.errors import InputError
+from envs.errors import InputError, one_of
 from envs.hand.hand_file import HandFile
 from envs.hand.nominal import vendor_hand
 from envs.hand.quantity import JointQuantity, Quantity
@@ -84,11 +84,13 @@ def calibrate(
         report: is called with what is being done.
 
     Raises:
-        InputError: records that cannot be used, or that move nothing.
+        InputError: records that cannot be used, of joints that the mechanism lacks, or
+            that move nothing.
     """
     moving = [log for log in logs if not is_pull(log)]
     pulls = tuple(pull_of(log) for log in logs if is_pull(log))
     fits = {}
+    _check_joints(moving, mechanism)
     for joint in dict.fromkeys(j for log in moving for j in log.header.joints):
         chosen = [log for log in moving if _moves(log, joint)]
         if chosen:
@@ -99,6 +101,15 @@ def calibrate(
         raise InputError(source, "", "nothing that moves", "joints that move, or pulls")
     digests = tuple(log.sha256 for log in logs)
     return Calibration(fits, pulls, _shared(mechanism, fits, pulls), digests)
+
+
+def _check_joints(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> None:
+    """Refuses a record of a joint that is not in the simulation."""
+    for log in logs:
+        for joint in log.header.joints:
+            if joint not in mechanism.joints:
+                valid = one_of(mechanism.joints, joint)
+                raise InputError(log.source, "joints", joint, valid)
 
 
 def _moves(log: MeasuredLog, joint: str) -> bool:

@@ -5,6 +5,7 @@ missing there, so streams of different rates stay what they are. Message types a
 by the definitions of the ROS library, never by those that a file brings along.
 """
 
+from array import array
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -14,10 +15,12 @@ from typing import Any, Literal
 import numpy as np
 
 from envs.errors import InputError, one_of
-from sysid.logs.columns import standard_units
+from fingers_deploy.files import open_regular
+from sysid.logs.columns import MAX_CELLS, MAX_COLUMNS, standard_units
 from sysid.logs.log import Load, LogHeader, MeasuredLog
 from sysid.logs.ros_messages import READERS
 
+MAX_BYTES = 4 << 30
 MAX_MESSAGES = 20_000_000
 _VALID = "the folder of a ROS 2 bag, or an MCAP file written by ROS 2"
 
@@ -87,7 +90,8 @@ class _Rows:
         self.path, self.map = path, bag_map
         self.names = {theirs: ours for ours, theirs in bag_map.joints.items()}
         self.t_ns: list[int] = []
-        self.cells: dict[str, list[tuple[int, float]]] = {}
+        self.cells: dict[str, tuple[array, array]] = {}
+        self.count = 0
 
     def add(self, topic: str, kind: str, received_ns: int, message: Any) -> None:
         """Adds one message as a row."""
@@ -101,10 +105,20 @@ class _Rows:
         try:
             for name, part, value in READERS[kind](message):
                 if (column := self._column(topic, name, part)) is not None:
-                    self.cells.setdefault(column, []).append((row, value))
+                    self._keep(column, row, value)
         except ValueError as error:
             found = f"{error} in message {row + 1}"
             raise InputError(self.path, topic, found, "whole messages") from error
+
+    def _keep(self, column: str, row: int, value: float) -> None:
+        """Adds one reading; 16 bytes each."""
+        self.count += 1
+        if self.count > MAX_CELLS or len(self.cells) > MAX_COLUMNS:
+            valid = f"at most {MAX_CELLS} in {MAX_COLUMNS} columns"
+            raise InputError(self.path, column, "more readings", valid)
+        rows, values = self.cells.setdefault(column, (array("q"), array("d")))
+        rows.append(row)
+        values.append(value)
 
     def _column(self, topic: str, name: str, part: str) -> str | None:
         """Returns the column of a reading, None for a joint that is not asked for."""
@@ -129,11 +143,11 @@ class _Rows:
         columns = {name: self._values(pairs) for name, pairs in self.cells.items()}
         return MeasuredLog(self._header(columns), t_s, columns, None, str(self.path))
 
-    def _values(self, pairs: list[tuple[int, float]]) -> np.ndarray:
+    def _values(self, readings: tuple[array, array]) -> np.ndarray:
         """Returns a column, NaN in the rows of other messages."""
         values = np.full(len(self.t_ns), np.nan)
-        rows, readings = zip(*pairs, strict=True)
-        values[list(rows)] = readings
+        rows, found = map(np.asarray, readings)
+        values[rows] = found
         return values
 
     def _header(self, columns: dict[str, np.ndarray]) -> LogHeader:
@@ -157,6 +171,9 @@ class _Rows:
 def _check_folder(path: Path) -> None:
     """Refuses a bag whose files lead out of its folder."""
     inner = [path, *path.iterdir()] if path.is_dir() else [path]
+    for file in inner:
+        if not file.is_dir():
+            open_regular(file, MAX_BYTES).close()
     home = path.resolve()
     for file in inner:
         if file != path and home not in file.resolve().parents:

@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 from envs.errors import InputError, one_of
 
+MAX_CELLS, MAX_COLUMNS = 25_000_000, 1000
+"""Of a log: twenty minutes of 40 columns at 500 Hz, in 200 MB."""
 FINGERS = ("thumb", "index", "middle", "ring", "little")
 
 

@@ -11,9 +11,12 @@ An empty cell is a missing reading. The file beside `log.csv` is `log.yaml`.
 """
 
 import csv
+import io
 import math
+from array import array
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -21,10 +24,14 @@ from envs.config.atomic_file import atomic_path
 from envs.config.strict_yaml import parse_yaml
 from envs.config.typed import dump_yaml, from_dict, load_yaml
 from envs.errors import InputError
+from fingers_deploy.files import open_regular
+from sysid.logs.columns import MAX_CELLS, MAX_COLUMNS
 from sysid.logs.log import LogHeader, MeasuredLog
 
-MAX_BYTES = 2 << 30
+MAX_BYTES = 1 << 30
 _MAX_HEADER_LINES = 1000
+_MAX_LINE = 1 << 18
+_PART = 1 << 20
 
 
 def read_csv(path: Path) -> MeasuredLog:
@@ -34,9 +41,9 @@ def read_csv(path: Path) -> MeasuredLog:
         InputError: not such a file; names the line where a cell is wrong.
     """
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"more than {MAX_BYTES} bytes")
-        with open(path, encoding="utf-8", newline="") as stream:
+        with open_regular(path, MAX_BYTES) as file:
+            _check_amount(file, path)
+            stream = io.TextIOWrapper(file, encoding="utf-8", newline="")
             comments, names, first = _head(stream, path)
             cells = _cells(stream, path, names, first)
     except (OSError, ValueError, csv.Error) as error:
@@ -84,15 +91,34 @@ def _checked_names(path: Path, names: list[str]) -> list[str]:
     """Refuses a table without times or with a column twice."""
     if "t" not in names:
         raise InputError(path, "columns", ", ".join(names), "a column t [s]")
+    if len(names) > MAX_COLUMNS:
+        found, valid = f"{len(names)} columns", f"at most {MAX_COLUMNS}"
+        raise InputError(path, "columns", found, valid)
     for name in names:
         if names.count(name) > 1:
             raise InputError(path, "columns", f"{name} twice", "every column once")
     return names
 
 
+def _check_amount(file: BinaryIO, path: Path) -> None:
+    """Refuses more cells, or longer lines, than are read in reasonable memory."""
+    cells = since = 0
+    while part := file.read(_PART):
+        cells += part.count(b",") + part.count(b"\n")
+        first, last = part.find(b"\n"), part.rfind(b"\n")
+        since = since + len(part) if last < 0 else len(part) - last
+        if cells > MAX_CELLS:
+            raise InputError(path, "", "more cells", f"at most {MAX_CELLS}")
+        if max(since, first) > _MAX_LINE:
+            valid = f"lines of at most {_MAX_LINE} bytes"
+            raise InputError(path, "", "a longer line", valid)
+    file.seek(0)
+
+
 def _cells(stream: Iterator[str], path: Path, names: list[str], first: int):
     """Returns the columns in order: numbers, and text for `key`."""
-    columns: list[list] = [[] for _ in names]
+    # Eight bytes a number, where a list takes forty.
+    columns: list[Any] = [[] if name == "key" else array("d") for name in names]
     numbers = [name != "key" for name in names]
     reader = csv.reader(stream)
     for row in reader:

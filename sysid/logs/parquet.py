@@ -7,12 +7,15 @@ from typing import Any
 import numpy as np
 
 from envs.config.atomic_file import atomic_path
+from envs.config.json_file import parse_json
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
+from fingers_deploy.files import open_regular
+from sysid.logs.columns import MAX_CELLS, MAX_COLUMNS
 from sysid.logs.log import LogHeader, MeasuredLog
 
 METADATA_KEY = b"fingers.measured_log"
-MAX_CELLS = 500_000_000
+MAX_BYTES = 1 << 30
 _VALID = "a Parquet file with numeric columns"
 
 
@@ -29,9 +32,12 @@ def read_parquet(path: Path) -> MeasuredLog:
 
     try:
         # `open` keeps to this one file: a path given to pyarrow may name a data set.
-        with open(path, "rb") as stream:
+        with open_regular(path, MAX_BYTES) as stream:
             file = pyarrow.parquet.ParquetFile(stream)
             header, digest = _header(path, file.schema_arrow.metadata or {})
+            if file.metadata.num_columns > MAX_COLUMNS:
+                found = f"{file.metadata.num_columns} columns"
+                raise InputError(path, "", found, f"at most {MAX_COLUMNS}")
             cells = file.metadata.num_rows * file.metadata.num_columns
             if not 0 <= cells <= MAX_CELLS:
                 raise InputError(path, "", f"{cells} cells", f"at most {MAX_CELLS}")
@@ -73,10 +79,7 @@ def _header(path: Path, metadata: dict[bytes, bytes]) -> tuple[LogHeader, str]:
     field = METADATA_KEY.decode()
     if METADATA_KEY not in metadata:
         raise InputError(path, f"metadata {field}", "", "the header of a log as JSON")
-    try:
-        data = json.loads(metadata[METADATA_KEY])
-    except (ValueError, RecursionError) as error:
-        raise InputError(path, f"metadata {field}", error, "JSON") from error
+    data = parse_json(metadata[METADATA_KEY], f"{path} metadata {field}")
     digest = data.pop("sha256", "") if isinstance(data, dict) else ""
     return from_dict(LogHeader, data, path), digest
 

@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from envs.errors import InputError
+from fingers_deploy.files import is_folder
 from sysid.logs.bag import BagMap, read_bag
 from sysid.logs.csv_file import read_csv, write_csv
 from sysid.logs.log import MeasuredLog
@@ -26,9 +27,10 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
         ModuleNotFoundError: the optional dependencies `data` are missing.
     """
     file = Path(path)
+    folder = is_folder(file)
     if not file.exists():
         raise InputError(file, "", "no such file", _VALID)
-    if file.is_dir() or file.suffix == ".mcap":
+    if folder or file.suffix == ".mcap":
         return read_bag(file, bag_map)
     if bag_map is not None:
         raise InputError(

@@ -8,6 +8,7 @@ from typing import Any, NoReturn
 from fingers_deploy.errors import shortened
 
 _LONGEST = 200  # of a sentence, without how to get help
+_DIGITS = 40
 _NUMBER = re.compile(r"[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?|[-+]?inf|nan", re.ASCII)
 _WHOLE = re.compile(r"[-+]?(\d+|0[xX][0-9a-fA-F]+)", re.ASCII)
 
@@ -31,18 +32,30 @@ class Parser(argparse.ArgumentParser):
         raise UsageError(f"{shortened(message, _LONGEST)} (see {self.prog} --help)")
 
 
-def whole(text: str) -> int:
-    """A whole number of plain digits: `1_0` and digits of other scripts are none."""
-    if not _WHOLE.fullmatch(text) or len(text) > 20:
-        raise argparse.ArgumentTypeError(f"{shortened(text)!r} is no whole number")
+def plain_whole(text: str) -> int | None:
+    """A whole number of plain digits; None for anything else, such as `1_0` or `١`."""
+    if not _WHOLE.fullmatch(text) or len(text) > _DIGITS:
+        return None
     return int(text, 0) if "x" in text.lower() else int(text)
 
 
+def plain_number(text: str) -> float | None:
+    """A number of plain digits; None for anything else, as `plain_whole`."""
+    return float(text) if _NUMBER.fullmatch(text) and len(text) <= _DIGITS else None
+
+
+def whole(text: str) -> int:
+    """A whole number, for an argument of the command line."""
+    if (value := plain_whole(text)) is None:
+        raise argparse.ArgumentTypeError(f"{shortened(text)!r} is no whole number")
+    return value
+
+
 def number(text: str) -> float:
-    """A number of plain digits, as `whole`."""
-    if not _NUMBER.fullmatch(text) or len(text) > 40:
+    """A number, for an argument of the command line."""
+    if (value := plain_number(text)) is None:
         raise argparse.ArgumentTypeError(f"{shortened(text)!r} is no number")
-    return float(text)
+    return value
 
 
 def refuse_empty(options: argparse.Namespace) -> None:

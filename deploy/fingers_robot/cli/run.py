@@ -10,12 +10,14 @@ from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.behaviour.joystick import QUIET_S
 from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.plan import read_plan
 from fingers_robot.cli.console import REFUSED, check_operator, drive
 from fingers_robot.cli.options import check_library, check_options, check_sources
 from fingers_robot.cli.parser import number, whole
 from fingers_robot.cli.speaker import Speaker
 from fingers_robot.drivers.open import KINDS
 from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
+from fingers_robot.record.log import read_log
 from fingers_robot.runtime.guard import guard_hand
 from fingers_robot.runtime.launcher import EXIT_UNKNOWN
 
@@ -99,6 +101,10 @@ def run(options: argparse.Namespace) -> int:
     bundles = [load_bundle(path) for path in options.bundles]
     if options.with_sources:
         check_sources(options, bundles)
+    if options.driver == "replay":
+        read_log(options.log)
+    if options.plan:
+        read_plan(options.plan, bundles[0].manifest.interface)
     if not options.unattended:
         check_operator()
     driver = _driver(options)

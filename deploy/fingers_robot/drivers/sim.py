@@ -13,6 +13,7 @@ import numpy as np
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import Interface
+from fingers_robot.drivers.one_file import read_model
 from fingers_robot.drivers.sim_packets import STATE, Ask, request
 from fingers_robot.drivers.stand_in import info_of, sound_health
 from fingers_robot.reading import Array, Health, ImuReading, Reading
@@ -145,6 +146,7 @@ class SimulatorProcess:
         seed: int = 0,
         lifetime_s: float = 86400.0,
     ):
+        read_model(Path(model))  # refused here, before any process starts
         self._folder = tempfile.TemporaryDirectory(prefix="fingers-sim-")
         self.path = str(Path(self._folder.name) / "hand")
         chain = interface.command_path

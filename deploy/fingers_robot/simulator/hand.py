@@ -12,16 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.files import read_regular
 from fingers_deploy.rotations import multiply
+from fingers_robot.drivers.one_file import read_model
 from fingers_robot.drivers.sim_packets import STATE
 from fingers_robot.simulator.command_path import CommandPath
-from fingers_robot.simulator.one_file import check_one_file
 
 HEALTH_S = 0.2
 EFFORT_AT_LIMIT_A = 1.0  # the torque limit stands for this current
 _ATTITUDE_NOISE_RAD, _GYRO_NOISE_RAD_S, _ANGLE_NOISE_RAD = 0.002, 0.01, 1e-4
-_MAX_MODEL_BYTES = 32 * 2**20
 
 
 class SimulatedHand:
@@ -52,7 +50,7 @@ class SimulatedHand:
         slew_rad_s: Sequence[float] | float = 2.8,
         seed: int = 0,
     ):
-        self.model = load_model(Path(model))
+        self.model = load_model(model)
         self._source = str(model)
         self.data = mujoco.MjData(self.model)
         ids = [self._actuator(name) for name in joint_names]
@@ -131,16 +129,15 @@ class SimulatedHand:
         return found
 
 
-def load_model(path: Path) -> mujoco.MjModel:
+def load_model(path: str | Path) -> mujoco.MjModel:
     """Reads a model that stands for itself: no includes, no files beside it.
 
     Raises:
         InputError: the file cannot be read, is no such model, or holds numbers that no
             hand has.
     """
-    data = read_regular(path, _MAX_MODEL_BYTES)
-    if path.suffix != ".mjb":
-        check_one_file(data, path)
+    path = Path(path)
+    data = read_model(path)
     try:
         if path.suffix == ".mjb":
             model = mujoco.MjModel.from_binary_path(str(path))

@@ -1,6 +1,5 @@
 """What a sweep has measured: one value for each member and measure, and what lacks."""
 
-import json
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -8,6 +7,7 @@ from pathlib import Path, PurePath
 from types import MappingProxyType
 from typing import Any
 
+from envs.config.json_file import read_table
 from envs.errors import InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.studies.sweep.manifest import Manifest, Member
@@ -138,11 +138,12 @@ def _summary(root: Path, manifest: Manifest, member: Member) -> dict[str, Any] |
         return f"{member.state} {where}" + (f": {member.reason}" * bool(member.reason))
     run = member.key.directory(root) / manifest.stages[-1]
     try:
-        found = json.loads((run / "eval" / SUMMARY_FILE).read_text(encoding="utf-8"))
+        file = run / "eval" / SUMMARY_FILE
+        if not file.exists():
+            return "done, but without an evaluation"
+        found = read_table(file)
         means = {k: _number(v["mean"]) for k, v in found["measures"].items()}
         kept = {key: found[key] for key in (*ALIKE, "steps_trained")}
-    except FileNotFoundError:
-        return "done, but without an evaluation"
     except (OSError, ValueError, AttributeError, TypeError, LookupError):
         return "done, but its evaluation cannot be read"
     return {**kept, "measures": means}

@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from envs.config.json_file import read_json
 from envs.config.typed import from_dict, to_dict
 from envs.errors import InputError
+from fingers_deploy.files import is_folder
 from fingers_mjx.runs.files import write_whole
 from fingers_mjx.studies.sweep.plan import Key
 
@@ -94,12 +96,10 @@ def read_manifest(directory: Path) -> Manifest:
         InputError: there is none, or not one that this version writes.
     """
     path = directory / MANIFEST_FILE
-    try:
-        data = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        found = "no sweep" if isinstance(error, FileNotFoundError) else error
-        raise InputError(path, "", found, "what fingers sweep writes") from error
-    return from_dict(Manifest, data, path)
+    is_folder(directory)
+    if not path.exists():
+        raise InputError(path, "", "no sweep", "what fingers sweep writes")
+    return from_dict(Manifest, read_json(path), path)
 
 
 def write_manifest(directory: Path, manifest: Manifest) -> None:

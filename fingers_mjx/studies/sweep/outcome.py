@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 from envs.config.atomic_file import write_atomic
-from envs.errors import BAD_INPUT
+from envs.config.json_file import read_table
+from envs.errors import BAD_INPUT, InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.studies.sweep.plan import LOG_FILE, Key
@@ -87,8 +88,8 @@ def last_lines(root: Path, key: Key, number: int) -> list[str]:
 
 def _noted(path: Path) -> Mapping[str, Any]:
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        return read_table(path)
+    except InputError:
         return {}
 
 

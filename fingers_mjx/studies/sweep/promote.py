@@ -1,10 +1,10 @@
 """Promotion: the best configurations of a sweep are trained on more seeds."""
 
-import json
 import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from envs.config.json_file import read_table
 from envs.errors import InputError, one_of
 from fingers_mjx.evaluation.direction import BETTER, Better, better
 from fingers_mjx.evaluation.files import SUMMARY_FILE
@@ -85,8 +85,13 @@ def _best(found: Mapping[str, list[float]], top: int, direction: Better) -> list
 def _measure(root: Path, member: Member, name: str) -> float:
     """Returns a measure of a member; NaN where it is undefined."""
     path = root / member.run / "eval" / SUMMARY_FILE
-    measures = json.loads(path.read_text(encoding="utf-8"))["measures"]
-    if name not in measures:
-        raise InputError(root, "promote.by", name, one_of(measures, name))
-    mean = measures[name]["mean"]
-    return math.nan if mean is None else float(mean)
+    measures = read_table(path).get("measures")
+    if not isinstance(measures, dict) or name not in measures:
+        valid = one_of(measures if isinstance(measures, dict) else (), name)
+        raise InputError(root, "promote.by", name, valid)
+    try:
+        mean = measures[name]["mean"]
+        return math.nan if mean is None else float(mean)
+    except (LookupError, TypeError, ValueError) as error:
+        valid = "an evaluation that fingers wrote"
+        raise InputError(path, f"measures.{name}", measures[name], valid) from error

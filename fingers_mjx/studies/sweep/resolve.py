@@ -16,6 +16,7 @@ from envs.config.atomic_file import PARTIAL, write_atomic
 from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml, load_hand_file
+from fingers_deploy.errors import shortened
 from fingers_mjx.runs.directory import flat
 from fingers_mjx.studies.sweep.plan import check_sweep
 from fingers_mjx.studies.sweep.promote import check_promotion
@@ -177,7 +178,7 @@ def _addable(spec: Sweep, name: str) -> dict[Any, Any]:
 
 
 def _changed(source: Path, field: str, found: Any, was: Any) -> InputError:
-    shown = [json.dumps(x, default=list) for x in (found, was)]
+    shown = [shortened(json.dumps(x, default=list), 50) for x in (found, was)]
     valid = (
         f"{shown[1]}, as the sweep was begun: seeds and configurations can be added, "
         "nothing taken away or changed; another directory takes another sweep"

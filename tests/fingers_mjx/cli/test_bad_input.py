@@ -122,7 +122,7 @@ SETTINGS = [
     (["train", "crawl", "--set", "num_envs=100000000000"], ["num_envs", "1.04858e+06"]),
     (["train", "crawl", "--out", FILE], ["--out", FILE, "Not a directory"]),
     (["train", "crawl", "--out", "/proc/run"], ["--out", "/proc", "No such file"]),
-    (["train", "crawl", "--hand", "run"], ["run", "Is a directory"]),
+    (["train", "crawl", "--hand", "run"], ["run", "a folder"]),
     (["train", "crawl", "--hand", "bundle/policy.onnx"], ["policy.onnx", "UTF-8"]),
     (["eval", FILE], [FILE, "no such file"]),
     (["eval", "run/run.json"], ["run.json", "SHA-256"]),

@@ -132,3 +132,11 @@ def test_what_cannot_be_calibrated_is_refused():
     with pytest.raises(InputError, match="at least 50"):
         short = {name: values[:40] for name, values in moved.items()}
         calibrate([make_log(("finger2_joint3",), t_s[:40], short)], hand_mechanism())
+
+
+def test_a_record_of_a_joint_that_the_mechanism_lacks_is_refused_by_name():
+    t_s = np.arange(50) * 0.01
+    wave = 0.1 * np.sin(10 * t_s)
+    log = make_log(("elbow",), t_s, {"cmd.elbow": wave, "pos.elbow": wave})
+    with pytest.raises(InputError, match="joints: found elbow; valid: one of"):
+        calibrate([log], hand_mechanism())

@@ -1,3 +1,5 @@
+import os
+
 import numpy as np
 import pytest
 from support.sysid_logs import small_log
@@ -135,3 +137,41 @@ def test_names_that_are_no_log(tmp_path):
         read_log(tmp_path / "x.txt")
     with pytest.raises(InputError, match=r"found \.mcap"):
         write_log(small_log(), tmp_path / "x.mcap")
+
+
+@pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
+@pytest.mark.parametrize("target", ["pipe", "/dev/zero"])
+def test_a_special_file_is_refused_at_once(tmp_path, suffix, target):
+    os.mkfifo(tmp_path / "pipe")
+    path = tmp_path / f"log{suffix}"
+    path.symlink_to(target)
+    with pytest.raises(InputError, match=r"found a (named pipe|device)"):
+        read_log(path)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"),
+    [
+        ("t," + ",".join(f"c{k}" for k in range(20_000)) + "\n", "20001 columns"),
+        ("t" + "," * 1_000_000 + "\n", "a longer line"),
+        ("t,cmd.knee\n" + ",\n" * 13_000_000, "more cells"),
+        ("t,cmd.knee,pos.knee\n" + "1" * 300_000 + "\n", "field larger"),
+    ],
+)
+def test_a_table_that_takes_too_much_is_refused_before_it_is_parsed(
+    tmp_path, body, words
+):
+    path = tmp_path / "log.csv"
+    path.write_text(body)
+    with pytest.raises(InputError, match=words):
+        read_log(path)
+
+
+def test_a_line_that_is_long_across_parts_is_found(tmp_path, monkeypatch):
+    monkeypatch.setattr("sysid.logs.csv_file._PART", 1000)
+    path = tmp_path / "log.csv"
+    path.write_text(GOOD + "a" * 300_000)
+    with pytest.raises(InputError, match="a longer line"):
+        read_log(path)
+    path.write_text(GOOD + "0.02,0.1,0.2\n" * 3000)
+    assert len(read_log(path)) == 3002

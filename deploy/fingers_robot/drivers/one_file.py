@@ -9,11 +9,26 @@ from pathlib import Path
 from xml.parsers import expat
 
 from fingers_deploy.errors import InputError
+from fingers_deploy.files import read_regular
 
-MAX_XML_BYTES = 8 * 2**20
+MAX_XML_BYTES, MAX_MJB_BYTES = 8 * 2**20, 32 * 2**20
 MAX_ELEMENTS, MAX_DEPTH, MAX_COPIES = 20_000, 100, 1000
 _ENDLESS = ("nrow", "ncol", "width", "height", "nkey", "nuserdata", "nstack", "memory")
 _LARGEST = 8192
+
+
+def read_model(path: str | Path) -> bytes:
+    """Reads a model, which for MuJoCo to read is MJCF (.xml) or compiled (.mjb).
+
+    Raises:
+        InputError: no regular file, too large, or as `check_one_file`.
+    """
+    path = Path(path)
+    if path.suffix == ".mjb":
+        return read_regular(path, MAX_MJB_BYTES)
+    data = read_regular(path, MAX_XML_BYTES)
+    check_one_file(data, path)
+    return data
 
 
 def check_one_file(data: bytes, path: Path) -> None:
@@ -26,9 +41,6 @@ def check_one_file(data: bytes, path: Path) -> None:
     Raises:
         InputError: naming line and attribute.
     """
-    if len(data) > MAX_XML_BYTES:
-        found, valid = f"{len(data)} bytes", f"an MJCF of at most {MAX_XML_BYTES}"
-        raise InputError(path, "", found, valid)
     parser = expat.ParserCreate("utf-8")
     open_elements: list[float] = [1.0]
     count = 0

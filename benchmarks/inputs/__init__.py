@@ -1,0 +1,1 @@
+"""Bad inputs: damaged, hostile files and words, for every reader and command."""
