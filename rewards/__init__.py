@@ -32,7 +32,7 @@ from rewards.compose import (
 )
 from rewards.contact import foot_slide, undesired_contact
 from rewards.direction import swing_against_command
-from rewards.effort import joint_acceleration, torque
+from rewards.effort import joint_acceleration, overload, target_lag, torque
 from rewards.footprint import (
     FootprintMemory,
     footprint_departure,
@@ -130,6 +130,7 @@ __all__ = [
     "object_reached",
     "object_regress",
     "other_depth",
+    "overload",
     "palm_tilt",
     "precomputed",
     "requested_depth",
@@ -142,6 +143,7 @@ __all__ = [
     "support_drift",
     "swing_against_command",
     "table_weights",
+    "target_lag",
     "torque",
     "track_mean_planar_velocity",
     "track_mean_yaw_rate",

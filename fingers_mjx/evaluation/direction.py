@@ -43,6 +43,7 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         **_STANDING,
     },
     "push": {
+        "stopped": "lower",
         "delivered": "higher",
         "delivered_to_20_cm": "higher",
         "delivered_20_to_30_cm": "higher",

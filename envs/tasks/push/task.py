@@ -28,6 +28,7 @@ from envs.tasks.push.camera import (
     step_camera,
 )
 from envs.tasks.push.guide import POCKET_V, cube_v, guidance, heading
+from envs.tasks.push.load import load_signals, stopped
 from envs.tasks.push.measures import push_measures
 from envs.tasks.push.scene import CUBE, HALF_M, POS, VEL, add_cube, place_cube
 from envs.tasks.push.settings import PushConfig, Range
@@ -169,18 +170,18 @@ class Push(Walking):
         signals: Signals,
         output: PhysicsOutput,
     ) -> dict[str, Shaped[Array, "..."]]:
-        """Cube and target: positions, velocity, distance d = ‖g − p_o‖, progress.
+        """Cube and target: positions, velocity, distance d = ‖g − p_o‖, progress; load.
 
         Returns:
             Positions and distances [m], `object_vel_w` [m/s]. `progress_mps` is −Δd/Δt,
             the decrease over the control step [m/s]; `fallen` is 1 where the episode
-            ends by a fall.
+            ends by a fall; with those of `load_signals`.
 
         Source:
             Paper, object pushing.
         """
-        del plant
         task, qpos = carried["task"], output.state.qpos
+        load = load_signals(plant, carried, signals, self.config.action_scale_rad)
         error = safe_norm(task.target_w - qpos[POS][:2])
         return {
             "object_pos_w": qpos[POS],
@@ -191,6 +192,7 @@ class Push(Walking):
             "progress_mps": (task.error_m - error) / self.config.control_dt_s,
             "pocket_to_object_m": cube_v(qpos, self._q_off) - jnp.array(POCKET_V),
             "fallen": fallen(signals, self.config).astype(jnp.float32),
+            **load,
         }
 
     def privileged(
@@ -245,17 +247,17 @@ class Push(Walking):
         """Delivery, d ∈ [0, 2 cm) and then [0, 5 cm) for 1 s; see `push_measures`.
 
         Returns:
-            Flags [1], times [s] and distances [m].
+            Flags [1], times [s] and distances [m]; `stopped`, see `load.stopped` [1].
 
         Source:
             Paper, object pushing.
         """
-        return push_measures(
-            recorded["target_error_m"],
-            recorded["target_distance_m"],
-            counts,
-            self.config.control_dt_s,
-        )
+        dt_s = self.config.control_dt_s
+        pressed = (recorded["effort_share"], recorded["joint_lag_rad"])
+        way = (recorded["target_error_m"], recorded["target_distance_m"])
+        return push_measures(*way, counts, dt_s) | {
+            "stopped": stopped(*pressed, counts, dt_s)
+        }
 
     def _truth(self, now_s: Float[Array, ""], qpos: Float[Array, " nq"]) -> Frame:
         """What there is to see."""

@@ -19,7 +19,7 @@ MEANINGS = {
     "higher": ("speed", "survival", "participation", "fraction", "delivered",
                "righted"),
     "lower": ("error", "time", "latency", "rate", "wrong", "stray", "tilt", "drift",
-              "transport", "sideways"),
+              "transport", "sideways", "stopped"),
 }  # fmt: skip
 
 
