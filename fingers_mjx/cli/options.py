@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
-import math
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -20,6 +19,8 @@ if TYPE_CHECKING:
     from fingers_mjx.ppo.config import TrainConfig
 
 MAX_SEED = 2**32 - 1
+MOST = 10**6
+"""Beyond any number of episodes, steps or seconds that ends within days."""
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
 
 
@@ -48,31 +49,30 @@ def command(
     return parser
 
 
-def whole(low: int, high: int | None = None) -> Callable[[str], int]:
+def whole(low: int, high: int = MOST) -> Callable[[str], int]:
     """Returns a converter to whole numbers from `low` to `high`."""
 
     def convert(text: str) -> int:
         value = plain_whole(text)
-        if value is None or value < low or (high is not None and value > high):
-            limit = f" and at most {high}" if high is not None else ""
+        if value is None or not low <= value <= high:
             raise argparse.ArgumentTypeError(
-                f"found {shortened(text)}; valid: a whole number of at least "
-                f"{low}{limit}"
+                f"found {shortened(text)}; valid: a whole number of at least {low} "
+                f"and at most {high}"
             )
         return value
 
     return convert
 
 
-def number(low: float = -math.inf) -> Callable[[str], float]:
-    """Returns a converter to finite numbers of at least `low`."""
+def number(low: float = -MOST, high: float = MOST) -> Callable[[str], float]:
+    """Returns a converter to numbers from `low` to `high`."""
 
     def convert(text: str) -> float:
         value = plain_number(text)
-        if value is None or not (math.isfinite(value) and value >= low):
-            limit = f" of at least {low:g}" if low > -math.inf else ""
+        if value is None or not low <= value <= high:
             raise argparse.ArgumentTypeError(
-                f"found {shortened(text)}; valid: a finite number{limit}"
+                f"found {shortened(text)}; valid: a finite number of at least {low:g} "
+                f"and at most {high:g}"
             )
         return value
 
