@@ -8,12 +8,11 @@ already has. Each nominal parameter has a tolerance within which it is as expect
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
 
-from envs.actuator.catalogue import effect_kind
 from envs.config.typed import load_yaml
 from envs.errors import InputError, one_of
 from envs.hand.hand_file import HandFile, load_hand_file
@@ -21,75 +20,8 @@ from envs.hand.importing.files import check_files
 from envs.hand.model import build_spec
 from envs.hand.nominal import FINGERS, vendor_hand
 from envs.physics.quiet_mujoco import mujoco
-
-SCHEMA = 1
-Effort = Literal["tau", "cur", "duty", "none"]
-
-
-@dataclass(frozen=True)
-class Nominal:
-    """A nominal parameter of the drive and how well it is known.
-
-    Attributes:
-        value: of the parameter.
-        tolerance: largest relative deviation within the expected; for a value of zero
-            in its own unit.
-        free: whether nothing is known of it: a fit may choose any value.
-    """
-
-    value: float
-    tolerance: float = field(default=0.05, metadata={"low": 0.0, "high": 10.0})
-    free: bool = False
-
-
-@dataclass(frozen=True)
-class JointDrive:
-    """Drive of one joint as simulated so far.
-
-    Attributes:
-        kp: position gain [N·m/rad, or N/m].
-        kd: velocity gain [N·m·s/rad, or N·s/m].
-        kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
-            the gain is the same in all records.
-        effort: column that holds the effort of the drive.
-        effort_scale: N·m (or N) per unit of that column.
-        effects: effects that the simulation has, with their parameters by name.
-        known: `controller` where unknown forces push on the joint, `mechanics` where
-            the law of the controller is not known: only that part is examined then.
-    """
-
-    kp: Nominal
-    kd: Nominal
-    kp_setting: str = ""
-    effort: Effort = "tau"
-    effort_scale: Nominal = field(default_factory=lambda: Nominal(1.0, 0.02))
-    effects: dict[str, dict[str, Nominal]] = field(default_factory=dict)
-    known: Literal["both", "controller", "mechanics"] = "both"
-
-    def __post_init__(self) -> None:
-        for name, parameters in self.effects.items():
-            known = effect_kind(name).parameters
-            for parameter in parameters:
-                if parameter not in known:
-                    valid = one_of(known, parameter)
-                    raise InputError("drive", f"effects.{name}", parameter, valid)
-
-    def parameter(self, effect: str, name: str, absent: float) -> float:
-        """Returns a parameter of an effect that the simulation has, else `absent`."""
-        found = self.effects.get(effect, {}).get(name)
-        return absent if found is None else found.value
-
-
-@dataclass(frozen=True)
-class DriveFile:
-    """`drive.yaml`: drives by joint name of the MJCF; `*` for all others."""
-
-    schema: int
-    joints: dict[str, JointDrive]
-
-    def __post_init__(self) -> None:
-        if self.schema != SCHEMA:
-            raise InputError("drive", "schema", self.schema, f"{SCHEMA}")
+from sysid.drive import DriveFile, JointDrive, Nominal
+from sysid.passive import with_passive
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,7 +71,8 @@ def model_mechanism(
     """Makes a mechanism of a compiled model and drives by joint name or `*`.
 
     Raises:
-        InputError: a drive of a joint that is not in the model, or no joint at all.
+        InputError: a drive of a joint that is not in the model, or no joint at all; or
+            something that is not simulated, see `sysid.passive`.
     """
     simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
     names = [model.joint(i).name for i in range(model.njnt)]
@@ -148,7 +81,11 @@ def model_mechanism(
         if name != "*" and name not in movable:
             raise InputError(source, "joints", name, one_of(movable, name))
     chosen = {n: drives.get(n, drives.get("*")) for n in movable}
-    kept = {name: drive for name, drive in chosen.items() if drive is not None}
+    kept = {
+        name: with_passive(model, name, drive, source)
+        for name, drive in chosen.items()
+        if drive is not None
+    }
     if not kept:
         raise InputError(source, "joints", ", ".join(drives), "a drive for a joint")
     return Mechanism(model, kept)

@@ -26,9 +26,10 @@ from scipy.signal import lfilter
 
 from sysid.calibration.record import joint_record
 from sysid.calibration.simulation import Motion
+from sysid.drive import JointDrive, Nominal
 from sysid.least_squares import Task, fit_all
 from sysid.logs.log import MeasuredLog, make_log
-from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.mechanism import model_mechanism
 
 RATE_HZ, STEP_S, FINE_S = 500.0, 0.001, 0.000125
 CUTOFF_HZ = 20.0

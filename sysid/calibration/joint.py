@@ -15,9 +15,10 @@ from jaxtyping import Float
 from envs.errors import InputError
 from sysid.calibration.record import Record, joint_record
 from sysid.calibration.simulation import SERVO, Motion
+from sysid.drive import JointDrive
 from sysid.least_squares import Task, fit_all, standard_errors
 from sysid.logs.log import MeasuredLog
-from sysid.mechanism import JointDrive, Mechanism
+from sysid.mechanism import Mechanism
 
 PARAMETERS: tuple[str, ...] = (
     "stiffness",

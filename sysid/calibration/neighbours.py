@@ -20,7 +20,8 @@ from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
-from sysid.mechanism import JointDrive, Mechanism
+from sysid.drive import JointDrive
+from sysid.mechanism import Mechanism
 from sysid.rigid import interpolated
 
 _COUPLED = 0.02

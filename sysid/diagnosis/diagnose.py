@@ -27,9 +27,6 @@ from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 from sysid.result import Diagnosis
 
-LEAST_MOTION = 2e-3
-"""Least range of a target in which something can be seen [rad or m]."""
-
 
 def diagnose(
     logs: Sequence[MeasuredLog], mechanism: Mechanism, seed: int = 0
@@ -75,7 +72,7 @@ def _examined(
     seen = [track.track.cmd]
     if mechanism.drives[track.joint].known == "controller":
         seen.append(track.track.pos)  # pulled by unknown forces
-    moved = any(np.ptp(np.asarray(x)) > LEAST_MOTION for x in seen)
+    moved = any(np.ptp(np.asarray(x)) > 0.0 for x in seen)
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)

@@ -21,10 +21,11 @@ from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import EffectKind
+from sysid.drive import JointDrive
 from sysid.excitation.bench import JointBench, joint_bench
 from sysid.excitation.check import STEP_S
 from sysid.excitation.plan import Plan
-from sysid.mechanism import JointDrive, Mechanism
+from sysid.mechanism import Mechanism
 
 NEEDED_NAT = 6.0
 """Log-likelihood gain from which on an effect counts as seen, or as distinguished."""

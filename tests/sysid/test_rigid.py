@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from envs.physics.quiet_mujoco import mujoco
-from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.drive import JointDrive, Nominal
+from sysid.mechanism import model_mechanism
 from sysid.rigid import JointMotion, at_rest, bodies_along, interpolated, mount_gravity
 
 MASS, LENGTH, ARMATURE, G = 0.3, 0.1, 1e-3, 9.81

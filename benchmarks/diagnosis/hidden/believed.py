@@ -8,13 +8,8 @@ from benchmarks.diagnosis.hidden.cases import Case
 from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
 from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
 from benchmarks.diagnosis.hidden.truth import Joint
-from sysid.mechanism import (
-    Effort,
-    JointDrive,
-    Mechanism,
-    Nominal,
-    model_mechanism,
-)
+from sysid.drive import Effort, JointDrive, Nominal
+from sysid.mechanism import Mechanism, model_mechanism
 
 
 def believed(stand: Stand, effort: bool = True) -> Mechanism:

@@ -17,6 +17,9 @@ LIKE = 0.9
 UNLIKE = 0.5
 """Correlation with its own target below which it does not follow that one."""
 
+FURTHEST_S = 0.5
+"""Rows further apart than this show nothing of a servo, not even its rests [s]."""
+
 SHIFTS = 12
 """Lags that are tried: up to about half a second."""
 
@@ -25,14 +28,24 @@ def check_records(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> None:
     """Checks units and names.
 
     Raises:
-        InputError: angles far outside of a joint's range, as degrees are; or an angle
-            that follows the target of another joint.
+        InputError: angles far outside of a joint's range, as degrees are; times in
+            milliseconds; or an angle that follows the target of another joint.
     """
     for log in logs:
         for joint in log.header.joints:
+            _check_rate(log, joint)
             _check_range(log, joint, mechanism)
         if len(log.header.joints) > 1:
             _check_names(log)
+
+
+def _check_rate(log: MeasuredLog, joint: str) -> None:
+    """Refuses times that can hardly be seconds."""
+    found = log.timing(f"pos.{joint}")
+    period_s = found.period_s
+    if period_s > FURTHEST_S and not found.backward.size:
+        valid = f"at most {FURTHEST_S:g} s (is t in milliseconds?)"
+        raise InputError(log.source, "t", f"rows {period_s:.4g} s apart", valid)
 
 
 def _check_range(log: MeasuredLog, joint: str, mechanism: Mechanism) -> None:

@@ -6,6 +6,9 @@ from jaxtyping import Float
 SMOOTH_STEPS = 0.8
 """Width of the smoothing of all channels [steps of the grid]."""
 
+AT_ONCE = 1e-4
+"""A target so near to a reading was sent with it: rounding decides nothing [steps]."""
+
 LONG_AGO = 1e6
 """Age of a target of which nothing is known [steps]."""
 
@@ -71,7 +74,8 @@ def held_targets(
     index = last[:, None] - np.arange(slots - 1, -1, -1)
     known = np.clip(index, 0, len(t_s) - 1)
     start = np.where(index > 0, t_s[known], -np.inf)
-    return values[known], np.maximum((start - grid[:, None]) / step_s, -LONG_AGO)
+    sent = np.maximum((start - grid[:, None]) / step_s, -LONG_AGO)
+    return values[known], np.where(sent > -AT_ONCE, 0.0, sent)
 
 
 def shares(sent: Float[np.ndarray, "n s"]) -> Float[np.ndarray, "n s"]:

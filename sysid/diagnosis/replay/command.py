@@ -11,6 +11,7 @@ with transport delay T, age of the readings L and drift d of their clock. Seen f
 readings that are late, the target was sent that much later.
 """
 
+import flax.struct
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
@@ -36,8 +37,25 @@ _WITHIN = jnp.asarray(WITHIN)[:, None, None]
 
 Params = dict[str, dict[str, Float[Array, " c"]]]
 
-Commands = tuple[Float[Array, "t p c"], Float[Array, "t p c"], Float[Array, "t k p c"]]
-"""Commands at the steps of the grid, their ripple, and how far they still go within."""
+
+@flax.struct.dataclass
+class Commands:
+    """What the servo follows.
+
+    Attributes:
+        path: at the steps of the grid, just before targets that arrive then [rad].
+        mean: over the step that ends there [rad].
+        ripple: mean about a step less what a smooth curve through the path would have
+            there: a servo that is read as often as targets come is always sampled at
+            the same phase of their sawtooth [rad].
+        ahead: how far the path still goes at the times `WITHIN` until the end of the
+            step [rad].
+    """
+
+    path: Float[Array, "t p c"]
+    mean: Float[Array, "t p c"]
+    ripple: Float[Array, "t p c"]
+    ahead: Float[Array, "t k p c"]
 
 
 def command_path(
@@ -55,10 +73,7 @@ def command_path(
         dt: step of the grid [s].
 
     Returns:
-        The commands [rad], and their ripple: the mean about a step less what a smooth
-        curve through the commands at the steps would have there. A servo that is read
-        as often as targets come is always sampled at the same phase of their sawtooth.
-        Last what they still go at the times `WITHIN` until the end of the step.
+        The commands [rad].
 
     Source:
         Ours; exact response of a first-order low-pass to held targets.
@@ -85,19 +100,20 @@ def command_path(
         parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
         total, passed = jnp.zeros_like(command), command
         for target, start, part in zip(targets, begin, parts, strict=True):
-            # No time at all would make 0 × ∞ of an absent limit.
-            h = jnp.maximum(part, 1e-6) * dt
+            # No time at all would make 0 × ∞ of an absent limit; it changes nothing.
+            acts, h = part > 0.0, jnp.maximum(part, 1e-6) * dt
             last, before = smooth, command
             goal = quantized(target[:, None], grid)
-            smooth = filtered(last, goal, cutoff, h)
-            command = _pursuit(command, last, smooth, speed, h)
+            smooth = _chosen(acts, filtered(last, goal, cutoff, h), last)
+            moved = _pursuit(before, last, smooth, speed, h)
+            command = _chosen(acts, moved, before)
             follows = (before == last) & (command == smooth)
             mean = goal - (smooth - last) * lag_s / h
             total += part * jnp.where(follows, mean, 0.5 * (before + command))
             h = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
             there = filtered(last, goal, cutoff, h)
             there = _pursuit(before, last, there, speed, h)
-            passed += (start < _WITHIN) * (there - passed)
+            passed += acts * (start < _WITHIN) * (there - passed)
         return (smooth, command), (command, total, command - passed)
 
     first = quantized(held[0, 0][:, None], grid)
@@ -109,7 +125,8 @@ def command_path(
     place = jnp.arange(len(path))[:, None] - jnp.round(steps)
     place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
     ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
-    return _late(path, steps), _late(_ripple(path, mean), steps), ahead
+    late = [_late(x, steps) for x in (path, mean, _ripple(path, mean))]
+    return Commands(late[0], late[1], late[2], ahead)
 
 
 def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):
@@ -125,12 +142,19 @@ def _pursuit(command, last, goal, speed, h):
 
     Where the goal comes to meet it, the command turns round with it within the step.
     """
-    gap = last - command
-    speed = jnp.minimum(speed, 1e6)
-    closing = speed * h - jnp.sign(gap) * (goal - last)
-    part = jnp.clip(jnp.abs(gap) / jnp.maximum(closing, 1e-9), 0.0, 1.0)
-    met = command + jnp.sign(gap) * speed * part * h
-    return limited(met, goal, speed, (1.0 - part) * h)
+    gap, reach = last - command, speed * h
+    closing = reach - jnp.sign(gap) * (goal - last)
+    ends = closing > 0.0
+    part = jnp.clip(jnp.abs(gap) / _chosen(ends, closing, 1.0), 0.0, 1.0)
+    part = _chosen(ends, part, 1.0 * (gap != 0.0))
+    met = command + jnp.sign(gap) * _chosen(part > 0.0, part * reach, 0.0)
+    there = limited(met, goal, speed, jnp.maximum(1.0 - part, 0.0) * h)
+    return _chosen(jnp.isfinite(speed), there, goal)
+
+
+def _chosen(condition, one, other) -> Array:
+    """Chooses by element; what is not chosen may be infinite."""
+    return jnp.asarray(jnp.where(condition, one, other))
 
 
 def _late(

@@ -8,9 +8,10 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-from envs.actuator.effect import EffectKind, Params
+from envs.actuator.effect import EffectKind, Params, Substep
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import EVERY
+from sysid.diagnosis.replay.command import Commands
 from sysid.diagnosis.replay.effects import ENTER, READ, RIGID, SLOW
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
@@ -28,6 +29,8 @@ class Nuisance:
         skew_s: age of the angle against the effort [s].
         hold_s: mean age at which a torque acts [s].
         rotor: inertia on the motor's side of a play [kg·m²].
+        ripple: share of the command's ripple that the logged effort lacks: 1 if it is
+            the torque at one moment, 0 if it is the mean of a row [1].
     """
 
     effort_gain: Float[Array, "*b c"]
@@ -36,6 +39,7 @@ class Nuisance:
     hold_s: Float[Array, "*b c"]
     push_gain: Float[Array, "*b c"]
     rotor: Float[Array, "*b c"]
+    ripple: Float[Array, "*b c"]
 
 
 @flax.struct.dataclass
@@ -127,6 +131,22 @@ class Candidates:
             speed - self.smoothing_s2 * now.jerk,
         )
 
+    def passes(self, x: Substep, way: Float[Array, "p 1"]) -> Float[Array, "p c"]:
+        """Share of a small torque that friction lets pass, h = 1 − ∂F/∂τ sign q̇ [1].
+
+        Args:
+            x: signals of the chain, with torque and load [N·m].
+            way: direction of the motion in [−1, 1].
+
+        Source:
+            Ours; the derivative of `load_friction`, F = |K_m τ − K_e τ_load|.
+        """
+        shares = self.effects.get("load_friction")
+        if shares is None:
+            return jnp.ones_like(x.torque)
+        rest = shares["drive_share"] * x.torque - shares["load_share"] * x.load
+        return jnp.abs(1.0 - shares["drive_share"] * jnp.sign(rest) * way)
+
     def chain(self, row: Row) -> Sequence[tuple[EffectKind, Params]]:
         """The effects with their parameters as they act at one step."""
         now, track = row.motion, self.track
@@ -134,7 +154,7 @@ class Candidates:
         enter = {
             "effort": gain * now.effort,
             "measured": track.measured[:, None],
-            "ripple": row.ripple,
+            "ripple": self.nuisance.ripple * row.ripple,
         }
         slow = {"slow_vel": now.slow_vel + 0.0 * gain}
         angle, speed, acc = (x[:, :, None] for x in row.within)
@@ -197,18 +217,12 @@ def _link_of(params, rotor):
     return gap, soft, jnp.where(soft > 0.0, own, rotor)
 
 
-def rows_of(
-    track: Track,
-    commands: tuple[
-        Float[Array, "t p c"], Float[Array, "t p c"], Float[Array, "t k p c"]
-    ],
-    dt: float,
-) -> Row:
+def rows_of(track: Track, commands: Commands, dt: float) -> Row:
     """Puts the motion and the commands of all steps together.
 
     Args:
         track: measured motion of the joint.
-        commands: command, ripple and way still ahead [rad]; see `command.command_path`.
+        commands: what the servo follows [rad]; see `command.command_path`.
         dt: step of the grid [s].
 
     Returns:
@@ -226,7 +240,8 @@ def rows_of(
         within_steps(track.acc, track.jerk, dt),
     )
     snap = jnp.asarray(jnp.gradient(track.jerk, dt, axis=0))
-    return Row(motion_of(track), snap, within, *commands)
+    ripple = track.between * commands.ripple
+    return Row(motion_of(track), snap, within, commands.path, ripple, commands.ahead)
 
 
 def at_step(row: Row) -> Row:

@@ -56,7 +56,8 @@ class Track(Motion):
         payload_kg: nominal mass of the payload [kg].
         kp, kd: nominal gains [N·m/rad], [N·m·s/rad].
         measured: 1 where the logged effort enters the gears, else 0.
-        between: 1 where the command's ripple lies between the readings, else 0.
+        between: 1 where the law is known by which the command's ripple between the
+            readings makes torque, else 0.
         noise: standard deviations of angle, its two derivatives and effort in both
             residuals, behind their band and what whitens them.
     """

@@ -17,8 +17,8 @@ from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
 from sysid.diagnosis.replay.link import DAMPING
 from sysid.diagnosis.replay.motion import Motion, Track
+from sysid.drive import JointDrive
 from sysid.logs.log import MeasuredLog
-from sysid.mechanism import JointDrive
 
 POINTS = 64
 """Number of frequencies over which noise is averaged."""
@@ -40,27 +40,30 @@ def residual_noise(
     track: Track,
     now: Motion,
     x: Substep,
-    follows: Float[Array, "p c"],
+    passes: Float[Array, "p c"],
     effort_gain: Float[Array, "1 c"],
     inertia: Float[Array, "p c"],
 ) -> tuple[ResidualNoise, ResidualNoise]:
     """Noise of a candidate's residuals, and of the nominal simulation's.
 
-    With noise s_0, s_1, s_2 of angle, speed and acceleration, s_e of the effort, and
-    the share f of its gains with which a servo follows,
+    With noise s_0, s_1, s_2 of angle, speed and acceleration, s_e of the effort, the
+    share f of its gains with which a servo follows, and the share h of a torque that
+    passes friction which grows with it,
 
         servo       s_u² = f² ((kp s_0)² + (kd s_1)²) / g²
         controller  σ_1² = s_u² + s_e²
-        mechanics   σ_2² = ((J s_2)² + (b s_1)²) / g² + s_τ²
+        mechanics   σ_2² = ((J s_2)² + (b s_1)²) / g² + (h s_τ)²
 
     where s_τ is s_e if the measured effort enters the gears, else s_u. Nominal: the
-    same with the nominal gains and inertia, f = g = 1 and b = 0.
+    same with the nominal gains and inertia, f = g = h = 1 and b = 0. Without h,
+    friction that cancels the torque would cancel its noise and seem to explain it.
 
     Args:
         track: nominal gains, and the noise s.
         now: one step of the motion, with a last axis for the candidates.
-        x: signals of the chain: gains kp, kd and viscous friction b.
-        follows: f in [0, 1]; a servo at its limit does not answer to noise.
+        x: signals of the chain: gains kp, kd, viscous friction b, and f in [0, 1]: a
+            servo at its limit does not answer to noise.
+        passes: h = 1 − ∂F/∂τ in the direction of motion [1].
         effort_gain: g, factor of the logged effort [1].
         inertia: J, on the encoder's side [kg·m²].
 
@@ -73,7 +76,7 @@ def residual_noise(
     kp, kd, measured = (v[:, None] for v in (track.kp, track.kd, track.measured))
     servo, nominal = [], []
     for angle, speed, _, _ in track.noise:
-        servo.append(follows * jnp.hypot(x.kp * angle, x.kd * speed) / effort_gain)
+        servo.append(x.follows * jnp.hypot(x.kp * angle, x.kd * speed) / effort_gain)
         nominal.append(jnp.hypot(kp * angle, kd * speed))
     _, speed, acc, effort = track.noise[1]
     own = jnp.hypot(inertia * acc, x.viscous * speed) / effort_gain
@@ -82,7 +85,7 @@ def residual_noise(
     nominal_enters = nominal[1] + measured * (effort - nominal[1])
     logged = track.noise[0, 3]
     return (
-        ResidualNoise(jnp.hypot(servo[0], logged), jnp.hypot(own, enters)),
+        ResidualNoise(jnp.hypot(servo[0], logged), jnp.hypot(own, passes * enters)),
         ResidualNoise(
             jnp.hypot(nominal[0], logged), jnp.hypot(nominal_own, nominal_enters)
         ),
@@ -151,10 +154,18 @@ def _fourth_differences(t_s: np.ndarray, x: np.ndarray, step_s: float) -> float:
     """
     period = float(np.median(np.diff(t_s)))
     d = np.abs(np.diff(x, 4)) / np.sqrt(70.0)
-    size = float(np.quantile(d, 0.3)) / 0.3853
-    if size == 0.0:  # many readings repeat the last one: a coarse encoder
-        size = float(np.sqrt(np.mean(d**2)))
+    size = max(float(np.quantile(d, 0.3)) / 0.3853, _step_of(x) / np.sqrt(12.0))
     return size * np.sqrt(min(period / step_s, 1.0))
+
+
+def _step_of(x: np.ndarray) -> float:
+    """Returns the step of a coarse encoder, whose readings come again; else 0.
+
+    Rounding makes no steps: values that are so near to each other are one.
+    """
+    values = np.unique(x)
+    gaps = np.diff(values)[np.diff(values) > 1e-9 * np.ptp(x)]
+    return float(gaps.min()) if 0 < gaps.size < 0.5 * len(x) else 0.0
 
 
 def band_noise(

@@ -14,7 +14,7 @@ Candidates differ in numbers only: every effect of the catalogue is present, tho
 a candidate does not have at their identity. One compilation serves all of them.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -125,10 +125,9 @@ def equation_error(
         Exciting trajectories for the identification of base inertial parameters of
         robots, 1992. The division by A is ours.
     """
-    path, ripple, ahead = command_path(track.held, track.sent, params, dt)
-    ripple = track.between * ripple
+    commands = command_path(track.held, track.sent, params, dt)
     candidates = make_candidates(track, params, nuisance, dt, names)
-    rows = rows_of(track, (path, ripple, ahead), dt)
+    rows = rows_of(track, commands, dt)
     start = _start(candidates, jax.tree.map(lambda v: v[0], rows))
     step = partial(_step, candidates, friction_speed)
     torques = jax.lax.scan(step, start, rows)[1]
@@ -166,8 +165,9 @@ def _step(
     inertia = nuisance.mass * now.inertia + x.inertia
     gain = nuisance.effort_gain
     ramp = candidates.slope_state
-    follows = jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0)
-    noise, nominal = residual_noise(track, now, x, follows, gain, inertia / carry.slope)
+    x = replace(x, follows=jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0))
+    passes = candidates.passes(x, _direction(now.slow_vel, friction_speed))
+    noise, nominal = residual_noise(track, now, x, passes, gain, inertia / carry.slope)
     encoder, slope = _encoder_slope(states[-2], qd, carry.slope)
     # y = f(q), ÿ = f' q̈ + ḟ' q̇
     acc = now.acc + (nuisance.skew_s + nuisance.hold_s) * now.jerk

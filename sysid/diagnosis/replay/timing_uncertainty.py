@@ -6,7 +6,7 @@ Both make a residual uncertain where much happens at once: its samples count les
 import numpy as np
 from jaxtyping import Float
 
-from sysid.mechanism import JointDrive
+from sysid.drive import JointDrive
 
 SAMPLING = 0.15
 """Share of a torque's fast changes that may be an artefact of sampling."""

@@ -18,8 +18,9 @@ from sysid.diagnosis.replay.timing_uncertainty import (
     timing_uncertainty,
 )
 from sysid.diagnosis.replay.validity import supported
+from sysid.drive import JointDrive
 from sysid.logs.log import MeasuredLog
-from sysid.mechanism import JointDrive, Mechanism
+from sysid.mechanism import Mechanism
 from sysid.rigid import Bodies, JointMotion, bodies_along, mount_gravity
 
 _RIGID = (
@@ -205,14 +206,13 @@ def _commands(one: _Joint) -> dict[str, np.ndarray]:
 def _constants(one: _Joint, logged: np.ndarray) -> dict[str, np.ndarray]:
     """What a piece has once."""
     drive = one.drive
-    between = _ripple_between(drive, one.pieces[0].every)
     return {
         "gravity": np.stack([b.gravity for b in one.bodies]),
         "payload_kg": np.array([b.payload_kg[one.j] for b in one.bodies]),
         "kp": drive.kp.value * np.array(one.gain_factors()),
         "kd": drive.kd.value * np.ones(len(one.pieces)),
         "measured": logged.astype(float),
-        "between": np.array(float(between)),
+        "between": np.array(float(drive.known == "both")),
     }
 
 
@@ -254,15 +254,6 @@ def neighbours(model, joints: tuple[str, ...], j: int) -> list[int]:
     before = [k for k, other in enumerate(body) if other == parents[j]]
     behind = [k for k, parent in enumerate(parents) if parent == body[j]]
     return before + behind or [j]
-
-
-def _ripple_between(drive: JointDrive, every: int) -> bool:
-    """Whether the ripple of the command lies between the readings.
-
-    Without a low-pass it jumps, and a reading may come before a jump or after it.
-    """
-    cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
-    return every == 1 and drive.known == "both" and bool(np.isfinite(cutoff))
 
 
 def _uncertainty(

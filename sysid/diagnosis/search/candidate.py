@@ -18,6 +18,7 @@ from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.noise import spring_noise_gain
 from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.whitening import correlation_time
 from sysid.least_squares import Fit, Task, fit_all
 
 
@@ -35,6 +36,8 @@ class Model:
             where only noise remains. Held-out folds would not show it: a fold that
             alone excites a parameter is badly predicted without it.
         noise_cost: n log A, log-likelihood that is lost by amplified noise [1].
+        correlation: samples of the residual that count as one; 1 where repeats say what
+            is noise [1].
     """
 
     effects: tuple[str, ...]
@@ -44,6 +47,18 @@ class Model:
     fold_theta: Float[np.ndarray, "g n"]
     errors: Float[np.ndarray, "2"]
     noise_cost: float
+    correlation: float = 1.0
+
+    def variance(self, samples: int) -> float:
+        """Variance of a residual that counts, max(1, τ S / n) [1].
+
+        Args:
+            samples: n, number of residuals that count.
+
+        Source:
+            Ours: what remains may be noise that was not known before, or model error.
+        """
+        return max(1.0, self.correlation * self.score / max(samples, 1))
 
 
 def log_likelihood_gain(worse: Model, better: Model, samples: int) -> float:
@@ -58,14 +73,14 @@ def log_likelihood_gain(worse: Model, better: Model, samples: int) -> float:
 
 
 def heldout_gain(worse: Model, better: Model, samples: int) -> float:
-    """The part of the gain from errors, ½ min(ΔS, ΔC) / max(1, s²).
+    """The part of the gain from errors, ½ min(ΔS, ΔC) / max(1, τ S / n).
 
-    s² = S / n is the error per sample that remains. The cost C on all data must fall as
-    much: a fold that alone excites a parameter is badly predicted from its prior, and
-    that is not the simulation's fault.
+    S / n is the error per sample that remains, and τ how many of them count as one. The
+    cost C on all data must fall as much: a fold that alone excites a parameter is badly
+    predicted from its prior, and that is not the simulation's fault.
     """
     held, fitted = worse.score - better.score, worse.fit.cost - better.fit.cost
-    return 0.5 * min(held, fitted) / max(1.0, better.score / max(samples, 1))
+    return 0.5 * min(held, fitted) / better.variance(samples)
 
 
 def off_prior(problem: Problem, model: Model, effect: str) -> float:
@@ -200,8 +215,21 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
         score = score + penalty if np.isfinite(score) else np.inf
         kept = thetas[k * count : (k + 1) * count]
         cost = noise_cost(problem, fit.theta, float(errors[1]))
-        models.append(Model(tuple(effects), fit, score, penalty, kept, errors, cost))
+        tau = _correlation(problem, fit)
+        parts = (score, penalty, kept, errors, cost, tau)
+        models.append(Model(tuple(effects), fit, *parts))
     return models
+
+
+def _correlation(problem: Problem, fit: Fit) -> float:
+    """Mean correlation time of both residuals, by how much remains of each."""
+    if problem.repeat:
+        return 1.0
+    shape = (2, *problem.fold.shape)
+    series, counts = fit.residual.reshape(shape), problem.counts().reshape(shape)
+    power = np.sum(series**2, (1, 2))
+    times = [correlation_time(r, c) for r, c in zip(series, counts, strict=True)]
+    return float(power @ times / max(power.sum(), 1e-300))
 
 
 def _penalty(problem: Problem, task: Task, effects, theta: np.ndarray) -> float:

@@ -1,12 +1,13 @@
-"""Folds of the cross-validation, and the period after which a motion repeats."""
+"""Folds of the cross-validation."""
 
 from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Int
 
-from sysid.diagnosis.replay.band import EVERY, sample_rows
+from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.search.repeats import Repeats
 from sysid.logs.log import MeasuredLog
 
 FOLDS = 3
@@ -15,40 +16,9 @@ FOLDS = 3
 BLOCK_S = 1.0
 """Length of the blocks that are dealt out to folds [s]."""
 
-ALIKE = 0.995
-"""Likeness above which two stretches of the target are repeats."""
-
-
-def repeat_of(data: JointTrack) -> int:
-    """Returns after how many samples the target repeats itself, 0 if it does not.
-
-    The lag of the largest likeness 1 − Σ (x − x')² / Σ (x² + x'²), if above `ALIKE`.
-    """
-    if data.valid.shape[1] != 1:
-        return 0
-    cmd = np.asarray(data.track.cmd, float)[sample_rows(len(data.track.cmd)), 0]
-    known = data.valid[:, 0].astype(float)
-    x = (cmd - cmd.mean()) * known
-    lags = np.arange(max(8, int(2.0 / (EVERY * data.dt))), int(0.55 * len(x)))
-    if not lags.size or x.std() < 1e-9:
-        return 0
-    # Where both readings are known: Σ (x − x')² and Σ x² + x'².
-    both = _overlap(x**2, known)[lags] + _overlap(known, x**2)[lags]
-    apart = both - 2.0 * _overlap(x, x)[lags]
-    likeness = 1.0 - apart / np.maximum(both, 1e-30)
-    best = int(np.argmax(likeness))
-    return int(lags[best]) if likeness[best] > ALIKE else 0
-
-
-def _overlap(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Returns Σ_t x_{t+k} y_t for all lags k ≥ 0."""
-    size = 1 << (2 * len(x) - 1).bit_length()
-    product = np.fft.rfft(x, size) * np.conj(np.fft.rfft(y, size))
-    return np.fft.irfft(product, size)[: len(x)]
-
 
 def folds_of(
-    data: JointTrack, logs: Sequence[MeasuredLog], repeat: int
+    data: JointTrack, logs: Sequence[MeasuredLog], repeats: Repeats
 ) -> Int[np.ndarray, "m p"]:
     """Divides the samples into folds g: by setting or load, by record, or by time.
 
@@ -57,7 +27,7 @@ def folds_of(
     Args:
         data: the joint's track.
         logs: the records.
-        repeat: samples after which the target repeats; those of a block stay together.
+        repeats: of the motion; those of a block stay together.
 
     Returns:
         Fold of every sample [1].
@@ -79,6 +49,5 @@ def folds_of(
     records = sorted(set(data.log.tolist()))
     if len(records) > 1:
         return np.tile([records.index(i) % FOLDS for i in data.log], (m, 1))
-    seconds = EVERY * data.dt * (np.arange(m) % repeat if repeat else np.arange(m))
-    blocks = np.stack([(seconds + s) // BLOCK_S for s in data.start_s], 1)
-    return blocks.astype(int) % FOLDS
+    seconds = EVERY * data.dt * repeats.root + data.start_s[repeats.root_piece]
+    return (seconds // BLOCK_S).astype(int) % FOLDS

@@ -59,7 +59,7 @@ def standard_errors(
     fit, space = model.fit, problem.space
     prior = np.diag(1.0 / space.prior_sds(model.effects)[fit.free] ** 2)
     gram = fit.jacobian.T @ fit.jacobian
-    scale = max(1.0, model.score / max(samples, 1))
+    scale = model.variance(samples)
     noise = np.diag(np.linalg.pinv(gram / scale + prior))
     inverse = np.linalg.pinv(gram + prior)
     blocks = _blocks(problem)
@@ -74,14 +74,10 @@ def standard_errors(
 
 def _blocks(problem: Problem) -> Int[np.ndarray, " r"]:
     """Numbers the blocks of time; repeats of a block belong together."""
-    samples = np.arange(len(problem.fold))
-    samples = samples % problem.repeat if problem.repeat else samples
-    block = (EVERY * problem.data.dt * samples // BLOCK_S).astype(int)
-    pieces = problem.fold.shape[1]
-    apart = 0 if problem.repeat else (block.max() + 1) * np.arange(pieces)
-    return np.concatenate(
-        [(block[:, None] + apart * np.ones((1, pieces), int)).ravel()] * 2
-    )
+    repeat = problem.repeat
+    block = (EVERY * problem.data.dt * repeat.root // BLOCK_S).astype(int)
+    apart = (block.max() + 1) * repeat.root_piece
+    return np.concatenate([(block + apart).ravel()] * 2)
 
 
 def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:

@@ -178,7 +178,8 @@ class Space:
                 params.setdefault(slot.effect, {})[slot.name] = x
             else:
                 nuisance[slot.name] = x
-        nuisance.setdefault("push_gain", np.ones(len(theta), np.float32))
+        for name in ("push_gain", "ripple"):
+            nuisance.setdefault(name, np.ones(len(theta), np.float32))
         return params, Nuisance(**nuisance)
 
     def local(self) -> list[int]:

@@ -2,8 +2,8 @@
 
 The noise of both residuals is coloured. Where the record repeats its targets it is
 described by autoregressive filters, from the difference of the repeats, which no model
-enters. Without repeats noise and missing effects cannot be separated beforehand: the
-residual of a candidate counts as noise, with its correlation in time.
+enters; without repeats it is what neighbouring samples do not share (`noise_floor`),
+and a candidate's residual that is larger counts with its correlation in time.
 """
 
 from collections.abc import Sequence
@@ -16,13 +16,15 @@ from jaxtyping import Bool, Float, Int
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
-from sysid.diagnosis.search.folds import folds_of, repeat_of
+from sysid.diagnosis.search.folds import folds_of
+from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.search.repeats import Repeats, repeats_of
 from sysid.diagnosis.search.whitening import (
     Noise,
     autoregressive,
     bulk_deviation,
-    correlated,
+    correlation_time,
     whitened,
     with_past,
 )
@@ -44,8 +46,9 @@ class Problem:
         valid: where the two residuals count (2, m, p).
         fold: fold of every sample (m, p).
         noise: of the residuals.
-        repeat: samples after which the target repeats; 0 if it does not.
+        repeat: where the motion was made before.
         weight: less than one where sampling may hide fast changes.
+        known: which part of the joint can be examined; see `JointDrive`.
     """
 
     data: JointTrack
@@ -53,8 +56,9 @@ class Problem:
     valid: Bool[np.ndarray, "2 m p"]
     fold: Int[np.ndarray, "m p"]
     noise: tuple[Noise, ...]
-    repeat: int
+    repeat: Repeats
     weight: Float[np.ndarray, "2 m p"]
+    known: str = "both"
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -157,7 +161,7 @@ class Problem:
         return int(self.counts().sum())
 
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "Problem":
-        """Takes the noise from the repeats of a residual, else from the residual.
+        """Takes the noise from the repeats of a residual, else from its neighbours.
 
         Samples of uncertainty u weigh w = 1 / √(1 + (u / s)²) where s is the noise.
 
@@ -174,12 +178,13 @@ class Problem:
             Approach, 2001.
         """
         noise, weights = [], []
-        made = autoregressive if self.repeat else correlated
         for k in range(2):
-            series, valid = self.differences(raw[k], self.valid[k])
-            size = bulk_deviation(series[valid]) if valid.any() else 1.0
+            size = self._noise(k, raw[k]).deviation
+            if self.repeat:
+                series, valid = self.differences(raw[k], self.valid[k])
+                size = bulk_deviation(series[valid]) if valid.any() else 1.0
             weights.append(1.0 / np.hypot(1.0, self.data.uncertainty[k] / size))
-            noise.append(made(*self.differences(weights[k] * raw[k], self.valid[k])))
+            noise.append(self._noise(k, weights[k] * raw[k]))
         data = self.data
         in_band = [band_noise(data.noise, data.dt, n.a) for n in noise]
         behind_filters = jnp.asarray(np.stack(in_band), jnp.float32)
@@ -191,10 +196,51 @@ class Problem:
             weight=np.stack(weights),
         )
 
+    def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "Problem":
+        """Takes what a model leaves as noise: s'² = max(s², τ mean r²).
+
+        Args:
+            raw: its residuals [N·m].
+
+        Returns:
+            The problem with white noise of that size.
+
+        Source:
+            Ours: without repeats errors that no effect removes pass for noise.
+        """
+        noise = []
+        for r, valid, known in zip(raw, self.valid, self.noise, strict=True):
+            left = np.mean(r[valid] ** 2) if valid.any() else 0.0
+            size = float(np.sqrt(correlation_time(r, valid) * left))
+            noise.append(Noise(np.zeros(0), max(size, known.deviation)))
+        return replace(self, noise=tuple(noise))
+
+    def _noise(self, k: int, series: Float[np.ndarray, "m p"]) -> Noise:
+        """Noise of one residual."""
+        valid = self.valid[k]
+        if self.repeat:
+            return autoregressive(*self.repeat.differences(series, valid))
+        track = self.data.track
+        angle, speed, acc, effort = np.asarray(track.noise[k], float) ** 2
+        kp, kd, inertia, measured = (
+            float(np.mean(np.asarray(x)))
+            for x in (track.kp, track.kd, track.inertia, track.measured)
+        )
+        # Of the mechanics the servo's share enters where the effort is not logged.
+        servo = 1.0 if k == 0 else 1.0 - measured
+        logged = 1.0 if k == 0 else measured
+        variances = (
+            servo * kp**2 * angle + logged * effort,
+            servo * kd**2 * speed,
+            k * inertia**2 * acc,
+        )
+        deviation = difference_noise(series, valid, np.array(variances))
+        return Noise(np.zeros(0), deviation)
+
     def differences(
         self, series: Float[np.ndarray, "m p"], valid: Bool[np.ndarray, "m p"]
-    ) -> tuple[Float[np.ndarray, "k p"], Bool[np.ndarray, "k p"]]:
-        """Difference of repeats d_t = (r_{t+N} − r_t) / √2, or else the whole series.
+    ) -> tuple[Float[np.ndarray, "m p"], Bool[np.ndarray, "m p"]]:
+        """Difference of repeats d = (r − r') / √2, or else the whole series.
 
         Args:
             series: a residual r [N·m].
@@ -206,10 +252,9 @@ class Problem:
         Source:
             Ours.
         """
-        n = self.repeat
-        if not n:
-            return series, valid
-        return (series[n:] - series[:-n]) / np.sqrt(2.0), valid[n:] & valid[:-n]
+        return (
+            self.repeat.differences(series, valid) if self.repeat else (series, valid)
+        )
 
 
 def make_problem(
@@ -230,7 +275,9 @@ def make_problem(
         mechanics = data.valid & data.effort
     # A joint at rest is balanced by whatever friction it has.
     mechanics = mechanics & data.moving
-    repeat = repeat_of(data)
+    headers = [logs[i].header for i in data.log]
+    kinds = [(h.settings, h.load, h.palm_quat_w) for h in headers]
+    repeat = repeats_of(data, kinds)
     white = Noise(np.zeros(0), 1.0)
     return Problem(
         data=data,
@@ -240,4 +287,5 @@ def make_problem(
         noise=(white,) * 2,
         repeat=repeat,
         weight=np.ones((2, *data.valid.shape)),
+        known=known,
     )

@@ -7,12 +7,14 @@ far off its prior is a finding and not silently absorbed.
 """
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
 from sysid.diagnosis.search.coupling import coupled
+from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, extended
@@ -50,6 +52,11 @@ class Search:
         without = self.without.get(cause, self.base)
         return log_likelihood_gain(without, model or self.best, self.samples)
 
+    @cached_property
+    def judge(self) -> Judge:
+        """Compares the simulations of its models."""
+        return Judge(self.problem)
+
 
 @dataclass(frozen=True, eq=False)
 class Examined:
@@ -75,35 +82,34 @@ class Examined:
 def search(problem: Problem) -> Search:
     """Runs the whole search on one joint.
 
-    Without repeats it runs again with the residual of the first result as noise.
+    Without repeats it runs again with what the first result leaves as noise.
     """
     problem, base = settled(problem)
     problem = coupled(problem, base)
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found
-    residual = problem.raw(found.best.fit.theta[None], weigh=False)[0]
-    problem = problem.with_noise(residual)
+    problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
     return _searched(problem, base)
 
 
 def _searched(problem: Problem, base: Model) -> Search:
     """Searches at a given noise."""
-    best = base
+    best, judge = base, Judge(problem)
     alternatives: dict[str, list[Model]] = {}
     for _ in range(MOST):
         stage = extended(problem, best)
         better = [m for m in stage if accepted(problem, best, m, base)]
-        if not better:
+        winner = _confirmed(judge, best, better)
+        if winner is None:
             break
-        winner = _fullest(better)
         again = _refitted(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
             better = [m for m in better if accepted(problem, again, m, base)]
-            if not better:
+            winner = _confirmed(judge, again, better)
+            if winner is None:
                 break
-            winner = _fullest(better)
             if again.score < best.score:
                 base = again if not best.effects else base
         best = pruned(problem, winner, base)
@@ -114,7 +120,7 @@ def _searched(problem: Problem, base: Model) -> Search:
     if len(best.effects) == 1 and best.effects[0] in alternatives:
         without = {best.effects[0]: base}
     else:
-        best, alternatives, without = exchanged(problem, best, base)
+        best, alternatives, without = exchanged(problem, best, base, judge)
     return Search(problem, base, best, alternatives, without, problem.samples)
 
 
@@ -127,6 +133,15 @@ def _fullest(better: list[Model]) -> Model:
     first, full = better[0], min(better, key=lambda m: m.errors.max())
     remains, rest = first.errors.max() - 1.0, full.errors.max() - 1.0
     return full if remains > EXCESS - 1.0 and rest < 0.5 * remains else first
+
+
+def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | None:
+    """Chooses the first effect with which the simulation comes nearer."""
+    if not better:
+        return None
+    first = _fullest(better)
+    order = [first, *(m for m in better if m is not first)][:TRIED]
+    return next((m for m in order if judge.confirms(smaller, m)), None)
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
@@ -168,7 +183,7 @@ def pruned(problem: Problem, model: Model, base: Model) -> Model:
 
 
 def exchanged(
-    problem: Problem, best: Model, base: Model
+    problem: Problem, best: Model, base: Model, judge: Judge
 ) -> tuple[Model, dict[str, list[Model]], dict[str, Model]]:
     """Lets other effects take the places of causes while that is better.
 
@@ -182,9 +197,12 @@ def exchanged(
     for _ in range(MOST):
         others, without = swapped(problem, best, base)
         idle = [
-            c for c in best.effects if not accepted(problem, without[c], best, base)
+            c
+            for c in best.effects
+            if not accepted(problem, without[c], best, base)
+            or not judge.confirms(without[c], best)
         ]
-        if idle and len(best.effects) > 1:
+        if idle:
             best = without[idle[0]]
             continue
         for cause, stage in others.items():
@@ -195,6 +213,7 @@ def exchanged(
                 for m in stage
                 if log_likelihood_gain(best, m, samples) > least
                 and accepted(problem, without[cause], m, base)
+                and judge.confirms(without[cause], m)
             ]
             if better:
                 break

@@ -14,7 +14,7 @@ from envs.actuator.effect import Parameter
 from sysid.diagnosis.replay.effects import joint_effects
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.parameters import NUISANCE, Kind, Slot, Space
-from sysid.mechanism import JointDrive, Nominal
+from sysid.drive import UNIVERSAL, JointDrive, Nominal
 
 SIGMA = 3.0**-0.5
 """Standard deviation of a uniform density within ±1 tolerance [tolerances]."""
@@ -34,6 +34,10 @@ MASS = 0.05
 
 ZERO_RAD = 1e-3
 """Tolerance of an encoder's zero where none is given [rad]."""
+
+SAMPLED = 1.0
+"""Tolerance of the share of a ripple that an effort lacks which jumps with its targets:
+drives report it at one moment, or as a mean."""
 
 ROTOR = 1.0
 """Tolerance of the logarithm of the motor's share of a joint's inertia."""
@@ -67,7 +71,7 @@ def make_space(track: JointTrack, drive: JointDrive, known: dict[str, bool]) -> 
             nominal = _nominal(drive, effect, track)
             for name, parameter in kind.parameters.items():
                 slot = _slot(effect, name, parameter, sizes.get(parameter.unit))
-                slot = slot if track.slide else _bounded(slot, parameter)
+                slot = _bounded(slot, parameter)
                 value = nominal.get(name)
                 slots.append(slot if value is None else _with_prior(slot, value))
     return Space(tuple(slots))
@@ -85,6 +89,10 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
         _nuisance("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
         _nuisance("rotor", "kg·m²", "log", rotor, ROTOR),
     ]
+    plain = not drive.effects.get("lowpass_cutoff")
+    if plain and track.effort.any():
+        sampled = _nuisance("ripple", "1", "linear", 1.0, SAMPLED)
+        slots.append(replace(sampled, nominal=1.0, low=0.0, high=1.0))
     if np.any(np.asarray(track.track.ext)):
         free = _nuisance("push_gain", "1", "linear", 1.0, math.inf)
         slots.append(replace(free, nominal=1.0))
@@ -119,7 +127,9 @@ def _sizes(track: JointTrack) -> dict[str, float]:
     """Returns a size that matters for every unit."""
     torque, speed, angle = track.torque_scale, track.speed_scale, track.angle_scale
     inertia = max(float(np.mean(np.asarray(track.track.inertia))), 1e-12)
-    return {
+    squared = float(np.mean(np.asarray(track.track.payload_inertia)))
+    carried = {"kg": inertia / squared, "m": 0.2 * squared**0.5} if squared else {}
+    return carried | {
         "N·m": torque,
         "rad": 0.1 * angle,
         "rad/s": speed,
@@ -188,7 +198,12 @@ def _linear(effect: str, name: str, parameter: Parameter, size: float | None) ->
 
 
 def _bounded(slot: Slot, parameter: Parameter) -> Slot:
-    """Keeps a coordinate within the range of its parameter."""
+    """Keeps a coordinate within the range of its parameter, where that has no size.
+
+    Torques, masses, angles and speeds are bounded by what occurs in the records alone.
+    """
+    if slot.unit not in UNIVERSAL:
+        return slot
     if slot.kind == "reciprocal":
         return replace(slot, high=min(slot.high, slot.coordinate(parameter.low)))
     ends = [slot.coordinate(x) if x != 0.0 or slot.kind == "linear" else slot.low
@@ -213,6 +228,10 @@ def _with_prior(slot: Slot, known: Nominal) -> Slot:
         near = (0.5 * nominal, 0.8 * nominal, 1.25 * nominal, 2.0 * nominal)
         starts = near + tuple(u for u in starts if u > nominal)
     low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
+    if slot.kind != "log" and slot.unit not in UNIVERSAL:
+        # What the drive file says may be far from what occurs in these records.
+        slot = replace(slot, high=max(slot.high, 2.0 * abs(nominal)))
+        low = min(low, -2.0 * abs(nominal)) if low < 0.0 else low
     return replace(
         slot,
         nominal=nominal,

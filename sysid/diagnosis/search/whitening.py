@@ -114,36 +114,31 @@ def autoregressive(
     return Noise(a, max(float(np.sqrt(np.mean(innovation**2))), 1e-12))
 
 
-def correlated(
+def correlation_time(
     series: Float[np.ndarray, "m p"], valid: Bool[np.ndarray, "m p"]
-) -> Noise:
-    """Takes a residual that may hold the effect itself as noise: s² = τ mean r².
-
-    A filter would remove the effect with it. Instead the deviation is raised by the
-    time τ = 1 + 2 Σ ρ_k over which samples are correlated, at most `LONGEST`.
+) -> float:
+    """How many samples count as one, τ = 1 + 2 Σ ρ_k ≤ `LONGEST`, while ρ_k ≥ 0.1.
 
     Args:
-        series: a residual [N·m].
+        series: a residual, of any unit.
         valid: where it counts.
 
     Returns:
-        White noise of that deviation [N·m].
+        τ ≥ 1 [1].
 
     Source:
         Variance of the mean of a correlated series: M. S. Bartlett, On the theoretical
         specification and sampling properties of autocorrelated time-series, 1946.
     """
-    if not valid.any():
-        return Noise(np.zeros(0), 1.0)
     x = np.where(valid, series, 0.0)
-    power = float(np.mean(x[valid] ** 2))
+    power = float(np.mean(x[valid] ** 2)) if valid.any() else 0.0
     total = 1.0
     for k in range(1, min(200, len(x) // 4)):
         both = valid[k:] & valid[:-k]
-        if both.sum() < 20:
+        if both.sum() < 20 or power == 0.0:
             break
-        rho = float(np.mean((x[k:] * x[:-k])[both])) / max(power, 1e-30)
+        rho = float(np.mean((x[k:] * x[:-k])[both])) / power
         if rho < 0.1:
             break
         total += 2.0 * rho
-    return Noise(np.zeros(0), max(np.sqrt(power * min(total, LONGEST)), 1e-12))
+    return min(total, LONGEST)

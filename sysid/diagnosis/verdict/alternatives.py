@@ -33,6 +33,7 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     """
     gain = evidence(found, cause)
     result = []
+    without = found.without.get(cause, found.base)
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
         gap = gain - found.gain(cause, model)
@@ -41,8 +42,9 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
         # Chance alone gives some effects as much as a nominal value's small step.
         chance = gain - gap < THRESHOLD and not _confusable(effect, cause)
         if np.isfinite(gap) and gap < 0.9 * gain:
-            shown = round(gap, 3)
-            result.append(Alternative(effect, shown, bool(distinct or chance), cause))
+            shown, apart = round(gap, 3), bool(distinct or chance)
+            apart = apart or not found.judge.confirms(without, model)
+            result.append(Alternative(effect, shown, apart, cause))
     return sorted(result, key=lambda a: a.score_gap)[:8]
 
 

@@ -1,17 +1,11 @@
 """What the causes remove of the error on held-out folds, and the noise floor."""
 
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.replay.band import sample_rows
-from sysid.diagnosis.search.candidate import Model, fit_models
-from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.search.candidate import Model
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
-from sysid.diagnosis.search.space import SIGMA
-from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Gain
 
 BLOCKS = 24
@@ -29,35 +23,18 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
         units: of `position`, `controller` and `mechanics`.
         seed: of the bootstrap over blocks of time.
     """
-    gains, base = {}, within_tolerances(found.problem, found.base)
+    gains, base = {}, found.judge.nominal(found.base)
     for name, k in (("controller", 0), ("mechanics", 1)):
         if found.problem.valid[k].any():
             before, after = (_heldout(found.problem, m, k) for m in (base, found.best))
-            gains[name] = _gain(found.problem, before, after, k, units[name], seed)
-    if found.problem.valid[:2].any((1, 2)).all() or not found.problem.data.effort.any():
-        before, after = (_angle_errors(found.problem, m) for m in (base, found.best))
+            valid = found.problem.valid[k]
+            gains[name] = _gain(found.problem, before, after, valid, units[name], seed)
+    if found.judge.sees:
+        before, after = (found.judge.error(m) for m in (base, found.best))
         gains["position"] = _gain(
-            found.problem, before, after, 1, units["position"], seed
+            found.problem, before, after, found.judge.valid, units["position"], seed
         )
     return gains
-
-
-def within_tolerances(problem: Problem, base: Model) -> Model:
-    """Fits the nominal parameters again, none of them beyond its tolerance.
-
-    A search lets them go further, at a penalty; but an error that a parameter out of
-    its tolerance would hide is there before the cause is known.
-    """
-    slots = []
-    for slot in problem.space.slots:
-        reach = slot.prior_sd / SIGMA if slot.prior_sd > 0.0 else np.inf
-        low, high = (
-            max(slot.low, slot.nominal - reach),
-            min(slot.high, slot.nominal + reach),
-        )
-        slots.append(replace(slot, low=low, high=high))
-    bounded = replace(problem, space=Space(tuple(slots)))
-    return fit_models(bounded, [()], [base.fit.theta])[0]
 
 
 def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, "m p"]:
@@ -66,17 +43,8 @@ def _heldout(problem: Problem, model: Model, channel: int) -> Float[np.ndarray, 
     return np.take_along_axis(raw, problem.fold[None], 0)[0]
 
 
-def _angle_errors(problem: Problem, model: Model) -> Float[np.ndarray, "m p"]:
-    """The same for the measured less the simulated angle."""
-    rows = sample_rows(len(problem.data.track.cmd))
-    measured = np.asarray(problem.data.track.pos, float)
-    error = (measured - simulated(problem, model.fold_theta))[:, rows]
-    return np.take_along_axis(error, problem.fold[None], 0)[0]
-
-
-def _gain(problem, before, after, k, unit, seed) -> Gain:
+def _gain(problem, before, after, valid, unit, seed) -> Gain:
     """Compares two held-out errors."""
-    valid = problem.valid[k]
     floors = [_floor(problem, errors, valid) for errors in (before, after)]
     floor = min((f for f in floors if f is not None), default=None)
     old, new = before[valid] ** 2, after[valid] ** 2
@@ -109,9 +77,7 @@ def _explained(before, after, floor: float | None):
 
 def _floor(problem: Problem, errors: np.ndarray, valid: np.ndarray) -> float | None:
     """Noise from repeats: what differs although the targets are the same."""
-    n = problem.repeat
-    if not n:
+    if not problem.repeat:
         return None
-    both = valid[n:] & valid[:-n]
-    d = (errors[n:] - errors[:-n])[both] / np.sqrt(2.0)
-    return float(np.sqrt(np.mean(d**2))) if d.size else None
+    d, counts = problem.repeat.differences(errors, valid)
+    return float(np.sqrt(np.mean(d[counts] ** 2))) if counts.any() else None

@@ -35,7 +35,7 @@ def blind_effects(found: Search) -> list[str]:
                 thetas.append(theta)
                 owners.append(name)
     rs = problem.residual(np.stack(thetas)) - model.fit.residual
-    scale = max(1.0, model.score / max(found.samples, 1))
+    scale = model.variance(found.samples)
     best = {name: 0.0 for name in names}
     for name, r in zip(owners, rs, strict=True):
         best[name] = max(best[name], _unabsorbed(found, r, space.of(name)) / scale)

@@ -4,7 +4,8 @@ The true effect removes its own error, from every residual, at parameters that t
 can have. A wrong one that comes near
 
 - leaves an error that is common to the repeats,
-- needs a parameter beyond the range of the effect, or
+- needs a parameter beyond the range of the effect,
+- does not bring the simulated motion nearer to the measured one, or
 - moves nominal parameters of the simulation far off their priors.
 
 What happens now and then, and not again when the motion is repeated, passes for noise;
@@ -40,6 +41,7 @@ def unexplained_signs(found: Search) -> list[str]:
     joint = found.problem.data.joint
     texts = [
         *_remaining(found),
+        *_no_nearer(found),
         *_at_bounds(found),
         *_off_prior(found),
         *_irregular(found),
@@ -48,14 +50,26 @@ def unexplained_signs(found: Search) -> list[str]:
 
 
 def _remaining(found: Search) -> list[str]:
-    """Finds residuals with much more than noise."""
+    """Finds residuals with much more than noise, which repeats alone show surely."""
     texts = []
+    if not found.problem.repeat:
+        return texts
     for k, name in enumerate(CHANNELS):
         before, after = found.base.errors[k], found.best.errors[k]
         if after > EXCESS and after - 1.0 > REMAINING * (before - 1.0):
             times = np.sqrt(after)
             texts.append(f"the {name} residual is {times:.1f} times the noise")
     return texts
+
+
+def _no_nearer(found: Search) -> list[str]:
+    """Finds causes that together do not lower the error of the simulated angle."""
+    judge, causes = found.judge, found.best.effects
+    if not causes or not judge.sees:
+        return []
+    if judge.t_value(judge.nominal(found.base), found.best) > 0.0:
+        return []
+    return [f"with {' and '.join(causes)} the simulated motion comes no nearer"]
 
 
 def _at_bounds(found: Search) -> list[str]:

@@ -116,10 +116,15 @@ def _leading(searched: Sequence[Examined], causes: Sequence[Cause]) -> Examined:
     )
 
 
-def _largest(gains: dict[str, Gain]) -> Gain:
-    """Chooses the gain of the residual that differed most."""
+def _largest(gains: dict[str, Gain]) -> Gain | None:
+    """Chooses the gain of the residual that differed most, of those that fall."""
 
     def differs(gain: Gain) -> float:
         return gain.heldout_rmse_before / (gain.noise_floor or gain.heldout_rmse_after)
 
-    return max((gains[name] for name in CHANNELS if name in gains), key=differs)
+    fall = [
+        gain
+        for name, gain in gains.items()
+        if name in CHANNELS and gain.heldout_rmse_after < gain.heldout_rmse_before
+    ]
+    return max(fall, key=differs, default=None)

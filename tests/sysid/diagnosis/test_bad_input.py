@@ -7,9 +7,10 @@ from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
+from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.logs.read import write_log
-from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.mechanism import model_mechanism
 
 ARM = """
 <mujoco><compiler angle="radian"/><worldbody>
@@ -100,3 +101,9 @@ def test_command_line(tmp_path, capsys):
         assert printed.err.count("\n") == 1
         assert name in printed.err
         assert not (tmp_path / "o").exists()
+
+
+def test_milliseconds():
+    log = log_of()
+    slow = make_log(log.header.joints, 1e3 * T, log.columns, source="arm.csv")
+    refused(slow, r"arm\.csv: t: found rows 5 s apart; valid: at most 0\.5 s")

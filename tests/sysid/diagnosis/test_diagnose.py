@@ -21,9 +21,9 @@ from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from envs.hand.hand_file import load_hand_file
 from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
+from sysid.drive import Nominal
 from sysid.logs.log import MeasuredLog, make_log
 from sysid.logs.read import write_log
-from sysid.mechanism import Nominal
 
 SEED = random.SystemRandom().randrange(10**6)
 ROUND_S = 6.0

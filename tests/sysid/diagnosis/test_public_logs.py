@@ -15,7 +15,8 @@ from benchmarks.diagnosis.public_logs.sts3215 import RAD_PER_COUNT, load_sts3215
 from benchmarks.diagnosis.public_logs.xl330 import load_xl330
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import examine
-from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.drive import JointDrive, Nominal
+from sysid.mechanism import model_mechanism
 
 REAL = os.environ.get("FINGERS_REAL_DATA", "")
 real = pytest.mark.skipif(not REAL, reason="FINGERS_REAL_DATA names no folder")

@@ -5,8 +5,9 @@ import pytest
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose
+from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
-from sysid.mechanism import JointDrive, Nominal, model_mechanism
+from sysid.mechanism import model_mechanism
 
 SEED = int.from_bytes(np.random.default_rng().bytes(3))
 ARM = """

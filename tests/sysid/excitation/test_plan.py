@@ -5,19 +5,13 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.stands import make_stand
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
+from sysid.drive import JointDrive, Nominal
 from sysid.excitation.check import fitting_plan, rehearse
 from sysid.excitation.files import separation_lines, write_plan
 from sysid.excitation.plan import Limits, Schedule, make_plan
 from sysid.excitation.separation import separation
 from sysid.excitation.waves import WAVES, multisine_lines
-from sysid.mechanism import (
-    JointDrive,
-    Nominal,
-    hand_mechanism,
-    joint_groups,
-    model_mechanism,
-    rest_posture,
-)
+from sysid.mechanism import hand_mechanism, joint_groups, model_mechanism, rest_posture
 
 TWO_ARMS = """
 <mujoco><compiler angle="radian"/><worldbody>

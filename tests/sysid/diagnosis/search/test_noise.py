@@ -13,10 +13,14 @@ from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
-from sysid.diagnosis.replay.noise import band_noise
+from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.search import Search, settled
+from sysid.diagnosis.search.whitening import bulk_deviation
 from sysid.diagnosis.verdict.observability import blind_effects
+from sysid.drive import JointDrive, Nominal
+from sysid.logs.log import make_log
 
 
 @pytest.mark.parametrize("whitening", [(), (0.56, -0.2, 0.15, -0.1)])
@@ -81,3 +85,43 @@ def test_how_a_joint_begins_makes_nothing_visible(monkeypatch, settled_s, visibl
     base = slightly_wrong(stand.mechanism, rng)
     find = _Finder(stand, base, joint, "encoder_offset", once, Noise(), 1)
     assert (find.ratio(0.01) > 1.05) == visible
+
+
+@pytest.mark.parametrize("order", [0, 2])
+def test_the_noise_of_a_residual_is_known_without_repeats(order):
+    """Behind the band, beside an effect that is larger by far and moves slowly."""
+    rng = np.random.default_rng(7)
+    width = np.hypot(BAND_STEPS, SMOOTH_STEPS)
+    y = smoothed(rng.normal(size=40_000), width, order)[::EVERY]
+    y = y / y.std()
+    t = np.arange(len(y))
+    effect = 30.0 * np.sin(2.0 * np.pi * t / 100.0) + 50.0 * (t % 500 < 3)
+    variances = np.zeros(3)
+    variances[order] = 0.01  # much less than there is
+    series, valid = (y + effect)[:, None], np.ones((len(y), 1), bool)
+    found = difference_noise(series, valid, variances)
+    assert found == pytest.approx(1.0, rel=0.12)
+    assert difference_noise(effect[:, None], valid, variances) < 0.25  # control
+
+
+def test_a_floor_is_at_least_that_of_the_readings_and_at_most_the_residual():
+    rng = np.random.default_rng(8)
+    series = rng.normal(size=(4000, 1))
+    valid = np.ones_like(series, bool)
+    assert difference_noise(series, valid, np.array([0.81, 0.0, 0.0])) >= 0.9
+    most = bulk_deviation(series[:, 0])
+    assert difference_noise(series, valid, np.array([100.0, 0.0, 0.0])) == most
+
+
+@pytest.mark.parametrize("residue", [0.0, 1e-16])
+def test_a_coarse_encoder_has_the_noise_of_its_step(residue):
+    """Also where the last digits of equal readings differ."""
+    rng = np.random.default_rng(9)
+    t_s = np.arange(0.0, 20.0, 0.005)
+    angle = np.round(0.5 * np.sin(t_s) / 0.01) * 0.01 + residue * rng.normal(
+        size=t_s.size
+    )
+    log = make_log(("a",), t_s, {"cmd.a": angle, "pos.a": angle})
+    drive = JointDrive(Nominal(1.0), Nominal(0.1), effort="none")
+    found, _ = reading_noise([log], "a", drive, 0.005)
+    assert found == pytest.approx(0.01 / np.sqrt(12.0), rel=0.05)

@@ -1,6 +1,7 @@
 """Neighbours that pull, repeats under jitter, and what remains unexplained."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -19,7 +20,10 @@ from sysid.diagnosis.search.coupling import coupled, with_neighbour
 from sysid.diagnosis.search.search import Search, settled
 from sysid.diagnosis.search.starts import starts_of
 from sysid.diagnosis.verdict.unexplained import _jumps, unexplained_signs
+from sysid.diagnosis.verdict.verdict import _largest
+from sysid.diagnosis.verdict.wording import summary_of
 from sysid.logs.log import make_log
+from sysid.result import Cause, Gain
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +63,8 @@ def test_jitter_does_not_widen_the_grid():
     t_s = np.concatenate([[0.0], np.cumsum(steps)])
     t_s = np.delete(t_s, [500, 1500])
     columns = {"cmd.a": np.sin(t_s), "pos.a": np.sin(t_s)}
-    assert grid_step_s([make_log(("a",), t_s, columns)], ["a"]) == 0.005
+    step_s = grid_step_s([make_log(("a",), t_s, columns)], ["a"])
+    assert step_s == pytest.approx(0.005, rel=2e-5)
 
 
 def test_nothing_is_unexplained_of_a_joint_without_effects(searched):
@@ -163,9 +168,36 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
         lambda problem, best, base: (offered.get(best.effects, {}), without),
     )
     monkeypatch.setattr(search_module, "pruned", lambda problem, model, base: model)
-    assert search_module.exchanged(problem, first, base)[0] is right
+    willing = SimpleNamespace(confirms=lambda smaller, larger: True)
+    assert search_module.exchanged(problem, first, base, willing)[0] is right
     close = scored(right.effects, 302.0)
     offered[first.effects]["payload_com"] = [close]
-    assert search_module.exchanged(problem, first, base)[0] is first
+    assert search_module.exchanged(problem, first, base, willing)[0] is first
     without["deadband"] = scored(("payload_com",), 298.0)
-    assert search_module.exchanged(problem, first, base)[0] is without["deadband"]
+    last = search_module.exchanged(problem, first, base, willing)[0]
+    assert last is without["deadband"]
+
+
+def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(searched):
+    """Whatever the equations say; the verdict cannot be `found`."""
+    problem, base = searched.problem, searched.base
+    wrong = fit_models(problem, [("hysteresis",)], [base.fit.theta])[0]
+    found = replace(searched, best=wrong)
+    shape = problem.data.valid.shape
+    near, far = (s * np.random.default_rng(1).normal(size=shape) for s in (0.01, 0.02))
+    for model, error in ((found.judge.nominal(base), near), (wrong, far)):
+        found.judge.errors[id(model)] = (model, error)
+    assert any("comes no nearer" in text for text in unexplained_signs(found))
+    found.judge.errors[id(wrong)] = (wrong, 0.5 * near)
+    assert not any("comes no nearer" in text for text in unexplained_signs(found))
+
+
+def test_a_sentence_says_falls_only_where_something_falls():
+    falls = Gain(0.2, 0.1, 0.75, 0.7, 0.8, "rad", None)
+    rises = Gain(9.43, 9.64, 0.0, 0.0, 0.0, "N", None)
+    assert _largest({"controller": falls, "mechanics": rises}) is falls
+    assert _largest({"mechanics": rises, "position": falls}) is None
+    cause = Cause("deadband", "servo", {}, 30.0)
+    said = summary_of("found", [cause], [], None, (), ())
+    assert "falls" not in said
+    assert "falls" in summary_of("found", [cause], [], falls, (), ())

@@ -1,0 +1,167 @@
+"""Simulation of one joint along its records, as training simulates it.
+
+Chain and joint are integrated from a measured state, at substeps that are short enough
+for their own lag not to count. Where the servo's law is known, a candidate follows the
+sent targets alone, from the start of every piece; where it is not, the logged effort
+drives the joint, in windows too short for errors to add up (multiple shooting).
+"""
+
+from dataclasses import replace
+from functools import partial
+
+import flax.struct
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from envs.actuator.chain import JointInput, chain_step, init_states
+from envs.actuator.joint import joint_step
+from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
+from sysid.diagnosis.replay.command import command_path
+from sysid.diagnosis.replay.effects import ENTER, KINDS
+from sysid.diagnosis.replay.model import Nuisance
+from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
+from sysid.diagnosis.replay.surroundings import surroundings_at
+from sysid.diagnosis.search.problem import Problem
+
+SUBSTEP_S = 0.00025
+"""Longest substep of the simulation [s]."""
+
+WINDOW_S = 0.5
+"""Length of a window that the logged effort drives [s]."""
+
+
+def simulated(
+    problem: Problem, thetas: Float[np.ndarray, "c n"]
+) -> Float[np.ndarray, "c t p"]:
+    """Encoder angles y of candidates, from measured starts.
+
+        (μ I + J) q̈ = τ + τ_load − b q̇ − F sign q̇,   y = f(q)
+
+    Args:
+        problem: the joint's track and coordinates.
+        thetas: coordinates of candidates [1].
+
+    Returns:
+        y at the steps of the grid [rad].
+
+    Source:
+        Output error of the same model: L. Ljung, System Identification: Theory for the
+        User, 1999, section 4.2; windows: H. G. Bock, Recent Advances in Parameter
+        Identification Techniques for O.D.E., 1983 (multiple shooting); integration:
+        `envs.actuator.joint`.
+    """
+    dt = problem.data.dt
+    substeps = max(1, int(np.ceil(dt / SUBSTEP_S)))
+    params, nuisance = problem.space.values(thetas)
+    driven = problem.known == "mechanics"
+    steps = len(problem.data.track.cmd)
+    window = max(round(WINDOW_S / dt), 8) if driven else steps
+    fixed = (dt / substeps, substeps, problem.space.effects, window, driven)
+    angles = _simulated(problem.data.track, params, nuisance, *fixed)
+    return np.moveaxis(np.asarray(angles, float), 2, 0)
+
+
+def sharp_angle(track: Track, dt: float) -> Float[np.ndarray, "t p"]:
+    """Measured angle before its smoothing of variance σ²: y ≈ y_s − ½ σ² ÿ_s [rad].
+
+    Args:
+        track: of the joint.
+        dt: step of the grid [s].
+
+    Source:
+        Ours; a Gaussian adds ½ σ² ÿ to first order.
+    """
+    half = 0.5 * (SMOOTH_STEPS * dt) ** 2
+    return np.asarray(track.pos, float) - half * np.asarray(track.acc, float)
+
+
+@flax.struct.dataclass
+class _Windows:
+    """The motion in windows side by side, and the mean targets of its substeps."""
+
+    motion: Motion
+    target: Float[Array, "w k l c"]
+    track: Track
+
+
+@partial(jax.jit, static_argnums=(3, 4, 5, 6, 7))
+def _simulated(
+    track: Track,
+    params: dict[str, dict[str, Float[Array, " c"]]],
+    nuisance: Nuisance,
+    dt: float,
+    substeps: int,
+    names: tuple[str, ...],
+    window: int,
+    driven: bool,
+) -> Float[Array, "t p c"]:
+    """Integrates all candidates side by side."""
+    effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in names}
+    model = [(KINDS[n], effects[n]) for n in names if n in KINDS]
+    gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
+    pushed = nuisance.push_gain[None, :]
+    count = gain.shape[1]
+    steps, pieces = track.pos.shape
+    cut = _cut(track, _targets(track, params, dt, substeps, count), window)
+    kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
+    enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
+
+    def chain(now):
+        return (*model, (ENTER, {**enters, "effort": gain * now.effort}))
+
+    def substep(carry, now, target):
+        states, q, qd, _ = carry
+        around, load = surroundings_at(cut.track, now, q - now.pos, mass, pushed)
+        joint = JointInput(target, q, qd, load, kp, kd, around)
+        states, x = chain_step(chain(now), states, joint, dt)
+        x = replace(x, damping=x.damping * (1.0 - float(driven)))
+        q, qd = joint_step(x, mass * now.inertia, dt)
+        return states, q, qd, x.encoder
+
+    def step(carry, row):
+        now = with_candidates(row[0])
+        carry = jax.lax.fori_loop(
+            0, substeps, lambda i, c: substep(c, now, row[1][i]), carry
+        )
+        return carry, carry[3]
+
+    first = with_candidates(jax.tree.map(lambda v: v[0], cut.motion))
+    q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
+    states = init_states(chain(first), cut.target[0, 0], q0, dt)
+    start = (states, q0, qd0, q0)
+    angles = jax.lax.scan(step, start, (cut.motion, cut.target))[1]
+    whole = angles.reshape(window, -1, pieces, count)
+    return jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps]
+
+
+def _targets(track: Track, params, dt: float, substeps: int, count: int):
+    """Mean command of every substep (t, k, p, c), along the sent targets."""
+    ends = jnp.arange(1, substeps + 1)[None, :, None, None]
+    sent = substeps * (track.sent[:, None] + 1.0) - ends
+    held = jnp.repeat(track.held[:, None], substeps, 1)
+    held, sent = (x.reshape(-1, *x.shape[2:]) for x in (held, sent))
+    mean = command_path(held, sent, params, dt).mean
+    return mean.reshape(-1, substeps, track.pos.shape[1], count)
+
+
+def _cut(track: Track, target: Float[Array, "t k p c"], window: int) -> _Windows:
+    """Cuts all along time into windows and lays them side by side."""
+    steps = len(track.pos)
+    number = -(-steps // window)
+    tail = number * window - steps
+
+    def cut(x):
+        wide = jnp.pad(x, [(0, tail)] + [(0, 0)] * (x.ndim - 1), "edge")
+        parts = wide.reshape(number, window, *x.shape[1:])
+        return jnp.swapaxes(parts, 0, 1).reshape(window, -1, *x.shape[2:])
+
+    moved = jnp.swapaxes(target, 1, 2)
+    beside = jnp.swapaxes(cut(moved), 1, 2)
+    constants = {
+        name: jnp.concatenate([getattr(track, name)] * number)
+        for name in ("gravity", "payload_kg", "kp", "kd")
+    }
+    motion = jax.tree.map(cut, motion_of(track))
+    return _Windows(motion, beside, replace(track, **constants))

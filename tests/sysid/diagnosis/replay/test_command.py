@@ -1,0 +1,62 @@
+"""The command path without a low-pass: what acts when, at delays below a row too."""
+
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from sysid.diagnosis.measured.resampling import held_targets
+from sysid.diagnosis.replay.command import command_path
+
+DT = 0.01
+ROWS = np.arange(400)
+
+
+def path_at(delay_rows, targets=ROWS, t_s=DT * ROWS, **effects):
+    """Path and mean of targets that are sent at the rows."""
+    held, sent = held_targets(t_s, targets.astype(float), DT * ROWS, 4)
+    params = {"transport_delay": {"delay_s": jnp.array([delay_rows * DT])}, **effects}
+    made = command_path(
+        jnp.array(held[..., None]), jnp.array(sent[..., None]), params, DT
+    )
+    return np.asarray(made.path)[:, 0, 0], np.asarray(made.mean)[:, 0, 0]
+
+
+@pytest.mark.parametrize("delay_rows", [0.0, 0.4, 1.0, 1.7, 4.5])
+def test_a_path_without_low_pass_holds_what_has_arrived(delay_rows):
+    """At row k the target k − T is the newest; a target of this moment comes after."""
+    path, _ = path_at(delay_rows)
+    rows = slice(20, 390)
+    newest = np.ceil(ROWS - delay_rows - 1e-4) - 1
+    assert path[rows] == pytest.approx(newest[rows])
+
+
+@pytest.mark.parametrize("delay_rows", [0.0, 0.3, 0.7, 1.2])
+def test_a_delay_below_a_row_moves_the_mean(delay_rows):
+    """Of a staircase that climbs by one each row, the mean falls by T."""
+    _, mean = path_at(delay_rows)
+    assert mean[20:390] == pytest.approx(ROWS[20:390] - 1.0 - delay_rows, abs=1e-3)
+
+
+def test_a_target_between_the_rows_acts_from_then():
+    """Sent 0.3 rows before row 200, it holds for that share of the step."""
+    t_s = np.array([0.0, DT * 199.7])
+    path, mean = path_at(0.0, np.array([0.0, 1.0]), t_s)
+    assert (path[199], path[200]) == (0.0, 1.0)
+    assert mean[200] == pytest.approx(0.3, abs=1e-3)
+
+
+@pytest.mark.parametrize("late", [1e-12, -1e-12])
+def test_rounding_of_a_clock_decides_nothing(late):
+    """A row's target acts behind its reading, on either side of the last digit."""
+    assert np.array_equal(path_at(0.0)[0], path_at(0.0, t_s=DT * ROWS + late)[0])
+
+
+def test_a_limit_that_is_absent_is_none():
+    """An infinite speed follows at once, in metres and in micrometres."""
+    for size in (1.0, 1e-6, 1e6):
+        none = path_at(
+            0.4, size * ROWS, slew_limit={"speed_rad_s": jnp.array([jnp.inf])}
+        )
+        assert none[0][20:] == pytest.approx(path_at(0.4, size * ROWS)[0][20:])
+    slow = path_at(0.4, slew_limit={"speed_rad_s": jnp.array([50.0])})[0]
+    assert np.diff(slow)[50:] == pytest.approx(0.5, abs=1e-4)
