@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 _FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules", "seeds")
 
+MAX_START_BYTES = 64 << 20
 MEMBERS, MOST_SEEDS = "members", 100
 """Directory of a population's members in its own, and how many there may be."""
 
@@ -78,12 +79,16 @@ def check(args: argparse.Namespace) -> None:
     """Refuses sizes that no machine or not this one has room for, before JAX loads.
 
     Raises:
-        InputError: naming the setting, or what all of them need.
+        InputError: naming the setting, or what all of them need; or a start that is
+            neither a folder nor a regular file.
     """
     from envs.config.typed import override
+    from fingers_deploy.files import is_folder, open_regular
     from fingers_mjx.ppo.config import check_config, preset
     from fingers_mjx.training.memory import check_memory
 
+    if args.warm_start is not None and not is_folder(args.warm_start):
+        open_regular(args.warm_start, MAX_START_BYTES).close()
     if args.resume is not None or args.preset == "adapt":
         return  # sizes that have been trained with
     rest = [x for x in args.settings if not x.startswith("env.")]

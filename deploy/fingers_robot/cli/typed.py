@@ -90,7 +90,7 @@ class Typed:
         """Returns one sentence on the lines that were refused since the last call."""
         with self._lock:
             count, self._refused = self._refused, 0
-            more = f" (and {count - 1} lines before it)" if count > 1 else ""
+            more = f" (and {count - 1} before it)" if count > 1 else ""
             return f"{self._refusal}{more}" if count else ""
 
     def _take(self, line: bytes) -> None:

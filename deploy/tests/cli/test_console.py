@@ -32,7 +32,7 @@ def test_refused_lines_are_answered_once_in_a_second(session):
         typed.feed(b"\xff\xfe\npolicy x\n" + b"a" * 3000 + b"\n")
         console.serve(0.01 * k)
     assert launcher.sent == [] and len(said) == 4
-    assert all(len(line) < 250 for line in said) and "lines before it" in said[1]
+    assert all(len(line) < 250 for line in said) and "before it" in said[1]
 
 
 def test_words_are_passed_on(session):

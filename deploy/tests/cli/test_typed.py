@@ -71,7 +71,7 @@ def test_refused_lines_are_counted_and_the_last_one_is_named(typed):
     assert console.refusal() == ""
     console.feed(b"policy 7\n\nnonsense\npolicy 8\n")
     said = console.refusal()
-    assert said == "found policy 8; valid: 0 to 1 (and 2 lines before it)"
+    assert said == "found policy 8; valid: 0 to 1 (and 2 before it)"
     assert console.refusal() == ""
 
 
