@@ -87,8 +87,9 @@ def check(args: argparse.Namespace) -> None:
     from fingers_mjx.ppo.config import check_config, preset
     from fingers_mjx.training.memory import check_memory
 
-    if args.warm_start is not None and not is_folder(args.warm_start):
-        open_regular(args.warm_start, MAX_START_BYTES).close()
+    begin = args.warm_start
+    if begin is not None and not is_folder(begin) and begin.exists():
+        open_regular(begin, MAX_START_BYTES).close()
     if args.resume is not None or args.preset == "adapt":
         return  # sizes that have been trained with
     rest = [x for x in args.settings if not x.startswith("env.")]
