@@ -76,3 +76,11 @@ def test_a_run_without_an_operator_is_refused(marching_dir, closed):
         "2 fingers-deploy: standard input: found closed; valid: a terminal or a pipe "
         "for the operator, or --unattended\n"
     )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("channel", CHANNELS, ids=[c.name for c in CHANNELS])
+def test_every_channel(hand_model, marching_dir, channel):
+    for seed in range(3):
+        off = fail_channel(hand_model, marching_dir, channel, seed)
+        assert off.safe and off.off_s <= channel.within_s, (seed, off)
