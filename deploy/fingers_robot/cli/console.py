@@ -47,7 +47,7 @@ def drive(
     console = Console(launcher, typed, speaker, arm, duration_s)
     if not unattended:
         console.attend(lambda: not typed.closed, lambda: speaker.read)
-    typed.listen(_STDIN)
+    typed.follow(_STDIN)
     # After the supervisor, before all that is not part of a run: a stop passes here.
     prefer_this_process(PRIORITY - 5, ask=bool(options["realtime"]))
     return console.run()

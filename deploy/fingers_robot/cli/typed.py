@@ -41,7 +41,7 @@ class Typed:
         self._sent_s: dict[str, float] = {}
         self._refused, self._refusal = 0, ""
 
-    def listen(self, handle: int) -> None:
+    def follow(self, handle: int) -> None:
         """Starts the thread that reads a file descriptor until it is closed."""
         arguments = (handle,)
         threading.Thread(target=self._run, args=arguments, daemon=True).start()

@@ -87,7 +87,7 @@ def test_a_line_without_end_takes_no_memory(typed):
 def test_the_thread_reads_until_the_end(typed):
     console, sent = typed
     read, write = os.pipe()
-    console.listen(read)
+    console.follow(read)
     os.write(write, b"arm\n" * 15_000 + b"stop\n")
     deadline = time.monotonic() + 10
     while sent != ["stop"] and time.monotonic() < deadline:
@@ -104,7 +104,7 @@ def test_a_handle_that_does_not_wait_is_not_taken_for_closed(typed):
     console, sent = typed
     read, write = os.pipe()
     os.set_blocking(read, False)
-    console.listen(read)
+    console.follow(read)
     threading.Timer(0.2, os.write, (write, b"stop\n")).start()
     deadline = time.monotonic() + 10
     while not sent and time.monotonic() < deadline:
