@@ -17,9 +17,9 @@ from fingers_mjx.reports.page import (
 )
 from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Examined
-from sysid.diagnosis.verdict.closed_loop import simulated
 from sysid.result import Diagnosis
 
 SHOWN_S = 12.0
