@@ -134,8 +134,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(error, file=sys.stderr)
         return 2
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as listener:
-        listener.bind(options.socket)
+        # Under its name only once it listens: whoever waits for the name connects.
+        listener.bind(f"{options.socket}.new")
         listener.listen(1)
+        os.rename(f"{options.socket}.new", options.socket)
         # A real hand does not wait for this computer either.
         prefer_this_process(PRIORITY + 10)
         Server(hand, listener).run(options.lifetime_s, options.parent)
