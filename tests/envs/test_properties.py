@@ -84,7 +84,7 @@ def hands(draw):
         "palm_mass": draw(between(0.01, 5)),
         "payload_pos": draw(st.lists(between(-0.2, 0.2), min_size=3, max_size=3)),
         "stiffness_scale": draw(scale),
-        "torque_scale": draw(st.one_of(between(0, 10), st.just(0.0))),
+        "torque_scale": draw(between(0.001, 10)),
         "delay_s": draw(between(0, 0.2)),
     }
     data = to_dict(HAND)

@@ -65,7 +65,7 @@ def load_falls(held_out: bool = False) -> Falls:
     """
     kind = "held_out" if held_out else "training"
     with files("envs.tasks.recovery").joinpath("falls.npz").open("rb") as stream:
-        stored = np.load(stream)
+        stored = np.load(stream, allow_pickle=False)
         names = tuple(SIDES)
         return Falls(
             side=tuple(names[index] for index in stored[f"{kind}_side"]),

@@ -179,8 +179,5 @@ def _addable(spec: Sweep, name: str) -> dict[Any, Any]:
 
 def _changed(source: Path, field: str, found: Any, was: Any) -> InputError:
     shown = [shortened(json.dumps(x, default=list), 50) for x in (found, was)]
-    valid = (
-        f"{shown[1]}, as the sweep was begun: seeds and configurations can be added, "
-        "nothing taken away or changed; another directory takes another sweep"
-    )
+    valid = f"{shown[1]}, as the sweep was begun; seeds and configurations can be added"
     return InputError(source, field, shown[0], valid)

@@ -29,13 +29,18 @@ def test_table_comes_back_with_its_description(tmp_path):
     assert pq.read_schema(path).metadata[b"task"] == b"crawl"
 
 
-@pytest.mark.parametrize("content", [None, b"", b"PAR1 but not really"])
+@pytest.mark.parametrize("content", [b"", b"PAR1 but not really"])
 def test_no_table_is_one_sentence(tmp_path, content):
     path = tmp_path / "episodes.parquet"
-    if content is not None:
-        path.write_bytes(content)
+    path.write_bytes(content)
     with pytest.raises(InputError, match=r"episodes\.parquet.*a Parquet table"):
         read_table(path)
+
+
+def test_a_table_that_is_not_there_is_one_sentence(tmp_path):
+    missing = r"episodes\.parquet: found No such file .*; valid: a regular file"
+    with pytest.raises(InputError, match=missing):
+        read_table(tmp_path / "episodes.parquet")
 
 
 def test_summary_has_what_readers_rely_on(tmp_path):
