@@ -13,7 +13,6 @@ from fingers_mjx.evaluation.steering.worlds import (
     Course,
     Holding,
     driven,
-    heading_rad,
     worlds_of,
 )
 from fingers_mjx.policy.source import PolicySource
@@ -72,8 +71,8 @@ def _kept(
 ) -> dict[str, float]:
     """Returns how one episode came to its heading and kept it; NaN if it was short."""
     trace, second = table.episode(number), round(1.0 / table.dt_s)
-    quat_w = np.array([rotations.multiply(q, q_off) for q in trace.palm_quat_w])
-    turned = np.unwrap(heading_rad(quat_w))
+    quats_w = (rotations.multiply(quat_w, q_off) for quat_w in trace.palm_quat_w)
+    turned = np.unwrap([rotations.heading(quat_w) for quat_w in quats_w])
     error_deg = np.rad2deg(turned - turned[:1] - step_rad)
     mean_deg = np.convolve(error_deg, np.ones(second) / second, "valid")
     survived = float(table.columns["survival"][number])

@@ -13,7 +13,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.errors import InputError
-from envs.rotations import multiply
+from envs.tasks.push.guide import heading
 from fingers_mjx.evaluation.evaluate import Episodes, EpisodeTable, Progress, evaluate
 from fingers_mjx.evaluation.source import measuring
 from fingers_mjx.evaluation.wrapped import Wrapped
@@ -99,22 +99,7 @@ class Holding(Commanded):
     def _heading(self, state: State) -> Float[Array, " b"]:
         """Returns the heading of V of every world [rad]."""
         q_off = jnp.asarray(self.env.stance.q_off)
-        quat_w = jax.vmap(lambda q: multiply(q, q_off))(state.signals.palm_quat_w)
-        return heading_rad(quat_w)
-
-
-def heading_rad(quat_w: Float[Any, "*b 4"]) -> Float[Any, "*b"]:
-    """Angle of x about the vertical, ψ = atan2(2(xy + wz), 1 − 2(y² + z²)) [rad].
-
-    Args:
-        quat_w: unit quaternions w x y z [1].
-
-    Source:
-        Diebel, *Representing attitude*, 2006 (Euler angles 3-2-1).
-    """
-    w, x, y, z = (quat_w[..., i] for i in range(4))
-    xp = jnp if isinstance(quat_w, jax.Array) else np
-    return xp.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+        return jax.vmap(lambda q: heading(q, q_off))(state.signals.palm_quat_w)
 
 
 def worlds_of(source: PolicySource, course: Course, kinds: int) -> BatchEnv:
