@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from fingers_deploy.manifest import Interface
+from fingers_robot.drivers.sim import server_arguments
 from fingers_robot.drivers.sim_packets import Ask
 from fingers_robot.simulator import server
 
@@ -47,18 +48,10 @@ class WatchedHand:
 
     def __init__(self, model: Path, interface: Interface, seed: int = 0):
         self._folder = tempfile.TemporaryDirectory(prefix="watched-hand-")
-        folder, chain = Path(self._folder.name), interface.command_path
+        folder = Path(self._folder.name)
         self.path, self._log = str(folder / "hand"), folder / "power"
         self._log.touch()
-        arguments = [
-            f"--socket={self.path}",
-            f"--joints={','.join(interface.joint_names)}",
-            f"--delay-s={chain.delay_s}",
-            f"--lowpass-hz={chain.lowpass_hz or 1e6}",
-            f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
-            f"--seed={seed}",
-            f"--parent={os.getpid()}",
-        ]
+        arguments = server_arguments(self.path, interface, seed)
         program = [sys.executable, __file__, str(self._log), str(model), *arguments]
         self.process = subprocess.Popen(program, cwd=folder)
         deadline = time.monotonic() + _START_S

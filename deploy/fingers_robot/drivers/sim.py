@@ -117,6 +117,26 @@ def where_the_palm_is(path: str | Path, interface: Interface) -> tuple[float, fl
         driver.close()
 
 
+def server_arguments(path: str, interface: Interface, seed: int) -> list[str]:
+    """Arguments of a simulator's process that ends with this one.
+
+    Args:
+        path: of its socket.
+        interface: of the policy, for joints and command path.
+        seed: of the sensor noise.
+    """
+    chain = interface.command_path
+    return [
+        f"--socket={path}",
+        f"--joints={','.join(interface.joint_names)}",
+        f"--delay-s={chain.delay_s}",
+        f"--lowpass-hz={chain.lowpass_hz or 1e6}",
+        f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
+        f"--seed={seed}",
+        f"--parent={os.getpid()}",
+    ]
+
+
 def _refusal(line: str) -> InputError:
     """The error that the simulator's process has said, or that it ended without one."""
     said = re.fullmatch(r"(.+?): found (.+); valid: (.+)", line)
@@ -149,17 +169,8 @@ class SimulatorProcess:
         read_model(Path(model))  # refused here, before any process starts
         self._folder = tempfile.TemporaryDirectory(prefix="fingers-sim-")
         self.path = str(Path(self._folder.name) / "hand")
-        chain = interface.command_path
-        arguments = [
-            f"--socket={self.path}",
-            f"--joints={','.join(interface.joint_names)}",
-            f"--delay-s={chain.delay_s}",
-            f"--lowpass-hz={chain.lowpass_hz or 1e6}",
-            f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
-            f"--seed={seed}",
-            f"--lifetime-s={lifetime_s}",
-            f"--parent={os.getpid()}",
-        ]
+        arguments = server_arguments(self.path, interface, seed)
+        arguments.append(f"--lifetime-s={lifetime_s}")
         program = [sys.executable, "-m", "fingers_robot.simulator.server"]
         self.process = subprocess.Popen(
             [*program, str(Path(model).absolute()), *arguments],
