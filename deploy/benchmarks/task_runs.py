@@ -29,9 +29,10 @@ from envs.tasks.keyboard.model import ACTUATION_M, ARROWS
 from envs.tasks.push.scene import HALF_M
 from envs.tasks.recovery.falls import load_falls
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.rotations import heading, multiply
+from fingers_deploy.rotations import multiply
 from fingers_robot.behaviour.command import FixedCommand
-from fingers_robot.behaviour.key_runner import KeyRunner
+from fingers_robot.behaviour.heading import heading
+from fingers_robot.behaviour.keyboard.runner import KeyRunner
 from fingers_robot.behaviour.tracker_port import TrackerPort
 from fingers_robot.behaviour.upright import tilt_angle
 from fingers_robot.safety import Mode, Operator

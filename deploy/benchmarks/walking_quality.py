@@ -24,7 +24,8 @@ from faults.links import LossyLink
 from hand_files import WALKING, write_model
 
 from fingers_deploy.bundle import load_bundle
-from fingers_deploy.rotations import gravity, heading, multiply, tilt, unrotate
+from fingers_deploy.rotations import gravity, multiply, tilt, unrotate
+from fingers_robot.behaviour.heading import heading
 from fingers_robot.reading import Health
 from fingers_robot.safety import Mode
 

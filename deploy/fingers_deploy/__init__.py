@@ -7,14 +7,16 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from fingers_deploy.action import ActionTransform
-    from fingers_deploy.bundle import Bundle, load_bundle
-    from fingers_deploy.controller import PolicyController
-    from fingers_deploy.errors import BundleError
-    from fingers_deploy.manifest import Manifest
-    from fingers_deploy.network import NumpyPolicy
-    from fingers_deploy.observation import ObservationAssembler
-    from fingers_deploy.policy import OnnxPolicy, load_policy
+    from fingers_deploy.action import ActionTransform as ActionTransform
+    from fingers_deploy.bundle import Bundle as Bundle
+    from fingers_deploy.bundle import load_bundle as load_bundle
+    from fingers_deploy.controller import PolicyController as PolicyController
+    from fingers_deploy.errors import BundleError as BundleError
+    from fingers_deploy.manifest import Manifest as Manifest
+    from fingers_deploy.network import NumpyPolicy as NumpyPolicy
+    from fingers_deploy.observation import ObservationAssembler as ObservationAssembler
+    from fingers_deploy.policy import OnnxPolicy as OnnxPolicy
+    from fingers_deploy.policy import load_policy as load_policy
 
 _PLACES = (
     "action.ActionTransform bundle.Bundle bundle.load_bundle errors.BundleError "
@@ -22,18 +24,6 @@ _PLACES = (
     "observation.ObservationAssembler policy.OnnxPolicy policy.load_policy"
 )
 _HOMES = {name: home for home, name in (p.split(".") for p in _PLACES.split())}
-__all__ = [
-    "ActionTransform",
-    "Bundle",
-    "BundleError",
-    "Manifest",
-    "NumpyPolicy",
-    "ObservationAssembler",
-    "OnnxPolicy",
-    "PolicyController",
-    "load_bundle",
-    "load_policy",
-]
 
 
 def __getattr__(name: str) -> Any:

@@ -159,13 +159,9 @@ def _check_term(field: str, term: Term, problem: _Problems) -> None:
 
 
 def _check_rates(interface: Interface, problem: _Problems) -> None:
-    action, path, rate = (
-        interface.action,
-        interface.command_path,
-        interface.control_rate_hz,
-    )
+    action, path = interface.action, interface.command_path
     positive = {
-        "control_rate_hz": rate,
+        "control_rate_hz": interface.control_rate_hz,
         "action.scale_rad": action.scale_rad,
         "action.clip": action.clip,
         "command_path.lowpass_hz": path.lowpass_hz,

@@ -94,14 +94,3 @@ def tilt(gravity_v: Vector) -> tuple[float, float]:
     """
     x, y, z = gravity_v
     return math.atan2(-y, -z), math.asin(max(-1.0, min(1.0, x)))
-
-
-def heading(quat_w: Vector) -> float:
-    """Angle of the frame's x axis about the world's up direction [rad], in (−π, π]."""
-    w, x, y, z = quat_w
-    return math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
-
-
-def wrap(angle_rad: float) -> float:
-    """The same angle in [−π, π)."""
-    return (angle_rad + math.pi) % (2 * math.pi) - math.pi

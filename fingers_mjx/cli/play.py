@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from fingers_mjx.play.episodes import Session
     from fingers_mjx.play.player import Player
     from fingers_mjx.runs.setup import Setup
-    from fingers_robot.behaviour.keys import KeyTimes
+    from fingers_robot.behaviour.keyboard.keys import KeyTimes
 
 
 def add(commands) -> None:
@@ -132,7 +132,7 @@ def keys_asked(args: argparse.Namespace, bundle: Bundle) -> tuple[str, ...] | No
     Raises:
         InputError: for a policy of another task, both options, or an unknown key.
     """
-    from fingers_robot.behaviour.keys import ARROWS
+    from fingers_robot.behaviour.keyboard.keys import ARROWS
 
     if args.keys is None and args.level is None:
         return None
@@ -157,7 +157,7 @@ def start_board(args: argparse.Namespace) -> Board | None:
 
 def key_times(args: argparse.Namespace, config: KeyboardConfig) -> KeyTimes:
     """Returns gap and time-out: the mean gap and the time-out of training."""
-    from fingers_robot.behaviour.keys import KeyTimes
+    from fingers_robot.behaviour.keyboard.keys import KeyTimes
 
     requests = config.requests
     return KeyTimes(sum(requests.idle_s) / 2, requests.timeout_s, args.retries)

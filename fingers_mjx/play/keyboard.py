@@ -18,12 +18,12 @@ from envs.observations import Sample
 from envs.tasks.keyboard.model import KEY_NAMES
 from envs.tasks.keyboard.requests import IDLE
 from fingers_deploy import Bundle
-from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluation.record import Trace
 from fingers_mjx.play.player import Played, Player, Schedule
 from fingers_mjx.play.sokoban import Board, move
-from fingers_robot.behaviour.keys import (
+from fingers_robot.behaviour.keyboard.fingertip import pressing_fingertip
+from fingers_robot.behaviour.keyboard.keys import (
     ARROWS,
     KeyOutcome,
     KeyState,

@@ -6,7 +6,7 @@ import numpy as np
 from envs.hand.hand_file import load_hand_file
 from envs.hand.nominal import vendor_hand
 from envs.tasks.keyboard.stance import JOINTS, fingertip_v, keyboard_stance
-from fingers_deploy.fingertip import FIRST_JOINT, pressing_fingertip
+from fingers_robot.behaviour.keyboard.fingertip import FIRST_JOINT, pressing_fingertip
 
 
 def test_shim_and_training_agree_over_the_joint_ranges():

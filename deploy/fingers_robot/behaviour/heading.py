@@ -1,8 +1,9 @@
 """Heading hold: yaw-rate command from the IMU's heading."""
 
+import math
 from dataclasses import dataclass
 
-from fingers_deploy.rotations import wrap
+from fingers_deploy.rotations import Vector
 
 _TURNING = 0.02  # a commanded rate above this steers, below it the heading is held
 
@@ -48,3 +49,14 @@ def heading_step(
         return heading_rad, min(max(rate, c.low), c.high)
     rate = c.gain * wrap(reference_rad - heading_rad) + c.offset_rad_s
     return reference_rad, min(max(rate, c.low), c.high)
+
+
+def heading(quat_w: Vector) -> float:
+    """Angle of the frame's x axis about the world's up direction [rad], in (−π, π]."""
+    w, x, y, z = quat_w
+    return math.atan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z))
+
+
+def wrap(angle_rad: float) -> float:
+    """The same angle in [−π, π)."""
+    return (angle_rad + math.pi) % (2 * math.pi) - math.pi

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fingers_deploy.manifest import Interface
-from fingers_deploy.rotations import gravity, heading, multiply
+from fingers_deploy.rotations import gravity, multiply
 from fingers_robot.behaviour.command import (
     FRESH_S,
     CommandSource,
@@ -16,8 +16,8 @@ from fingers_robot.behaviour.command import (
     rest_command,
 )
 from fingers_robot.behaviour.exchange import Query
-from fingers_robot.behaviour.heading import HeadingConfig, heading_step
-from fingers_robot.behaviour.key_runner import KeyRunner
+from fingers_robot.behaviour.heading import HeadingConfig, heading, heading_step
+from fingers_robot.behaviour.keyboard.runner import KeyRunner
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, Given, reads, resized
 from fingers_robot.behaviour.tracker_port import TrackerPort
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.manifest import Interface, Term
 from fingers_deploy.observation import COMMON_TERMS
+from fingers_robot.behaviour.keyboard.fingertip import pressing_fingertip
 
 Array = NDArray[np.float32]
 Given = Mapping[str, NDArray]

@@ -9,7 +9,7 @@ from fingers_deploy.bundle import load_bundle
 from fingers_deploy.errors import InputError
 from fingers_deploy.manifest import JOINT_COUNT, Interface
 from fingers_robot.behaviour.joystick import QUIET_S
-from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.keyboard.keys import ARROWS
 from fingers_robot.behaviour.plan import read_plan
 from fingers_robot.cli.console import REFUSED, check_operator, drive
 from fingers_robot.cli.options import check_library, check_options, check_sources

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.keyboard.keys import ARROWS
 
 HELP = "type: arm, stop, off, clear, policy N, keys NAME …, status, quit"
 URGENT = ("stop", "off", "quit")

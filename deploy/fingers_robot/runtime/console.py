@@ -6,7 +6,7 @@ import socket
 from collections import deque
 from typing import Any
 
-from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.keyboard.keys import ARROWS
 from fingers_robot.safety.types import Operator
 from fingers_robot.waiting import waiting
 

@@ -14,8 +14,8 @@ from fingers_deploy.manifest import Interface
 from fingers_robot.behaviour.command import CommandSource, FixedCommand
 from fingers_robot.behaviour.heading import HeadingConfig
 from fingers_robot.behaviour.joystick import Joystick
-from fingers_robot.behaviour.key_runner import KeyRunner
-from fingers_robot.behaviour.keyboard import Keyboard
+from fingers_robot.behaviour.keyboard.events import Keyboard
+from fingers_robot.behaviour.keyboard.runner import KeyRunner
 from fingers_robot.behaviour.plan import Plan, read_plan
 from fingers_robot.behaviour.policies import Policies
 from fingers_robot.behaviour.sources import Sources

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from fingers_deploy import PolicyController
-from fingers_deploy.fingertip import pressing_fingertip
 from fingers_deploy.manifest import Observation, Term
 from fingers_deploy.rotations import conjugate, multiply
 from fingers_robot.behaviour.command import FixedCommand, Frame
 from fingers_robot.behaviour.exchange import Query
 from fingers_robot.behaviour.heading import HeadingConfig
-from fingers_robot.behaviour.key_runner import KeyRunner
-from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.keyboard.fingertip import pressing_fingertip
+from fingers_robot.behaviour.keyboard.keys import ARROWS
+from fingers_robot.behaviour.keyboard.runner import KeyRunner
 from fingers_robot.behaviour.policies import STAND_S, Policies
 from fingers_robot.behaviour.sources import Sources
 from fingers_robot.behaviour.tracker_port import TrackerPort

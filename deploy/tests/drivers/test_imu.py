@@ -5,14 +5,8 @@ import numpy as np
 import pytest
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.rotations import (
-    conjugate,
-    gravity,
-    heading,
-    multiply,
-    tilt,
-    unrotate,
-)
+from fingers_deploy.rotations import conjugate, gravity, multiply, tilt, unrotate
+from fingers_robot.behaviour.heading import heading
 from fingers_robot.drivers.bno085 import Bno085, parse_reports
 from fingers_robot.drivers.imu_port import ImuPort
 

@@ -16,7 +16,7 @@ from fingers_mjx.evaluation.steering.worlds import (
     worlds_of,
 )
 from fingers_mjx.policy.source import PolicySource
-from fingers_robot.behaviour.heading import HeadingConfig
+from fingers_robot.behaviour.heading import HeadingConfig, heading
 
 STEPS_DEG = (0.0, 15.0, -15.0, 30.0, -30.0)
 """Changes of the heading that are held; 0 shows the drift."""
@@ -72,7 +72,7 @@ def _kept(
     """Returns how one episode came to its heading and kept it; NaN if it was short."""
     trace, second = table.episode(number), round(1.0 / table.dt_s)
     quats_w = (rotations.multiply(quat_w, q_off) for quat_w in trace.palm_quat_w)
-    turned = np.unwrap([rotations.heading(quat_w) for quat_w in quats_w])
+    turned = np.unwrap([heading(quat_w) for quat_w in quats_w])
     error_deg = np.rad2deg(turned - turned[:1] - step_rad)
     mean_deg = np.convolve(error_deg, np.ones(second) / second, "valid")
     survived = float(table.columns["survival"][number])

@@ -24,7 +24,7 @@ from fingers_mjx.play.sokoban import ONE_BOX, SOLUTIONS, TWO_BOXES, read_level
 from fingers_mjx.play.sokoban_board import draw_panel
 from fingers_mjx.play.video import Film
 from fingers_mjx.runs.setup import make_env, new_setup
-from fingers_robot.behaviour.keys import ARROWS, KeyOutcome, KeyTimes
+from fingers_robot.behaviour.keyboard.keys import ARROWS, KeyOutcome, KeyTimes
 
 START = read_level(ONE_BOX)
 SOLUTION = SOLUTIONS[ONE_BOX]

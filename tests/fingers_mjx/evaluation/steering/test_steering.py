@@ -149,11 +149,11 @@ def test_a_hand_that_does_not_turn_settles_nowhere_but_where_it_is():
 
 
 def test_headings_are_those_of_the_shim():
-    from fingers_deploy import rotations
+    from fingers_robot.behaviour.heading import heading as heading_w
 
     quats = np.random.default_rng(3).normal(size=(50, 4))
     quats /= np.linalg.norm(quats, axis=1, keepdims=True)
-    expected = [rotations.heading(quat) for quat in quats]
+    expected = [heading_w(quat) for quat in quats]
     found = jax.vmap(lambda quat: heading(quat, jnp.array(Q_OFF)))(jnp.asarray(quats))
     np.testing.assert_allclose(found, expected, atol=1e-5)
 

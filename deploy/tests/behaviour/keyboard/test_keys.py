@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from fingers_deploy.errors import InputError
-from fingers_robot.behaviour.keys import ARROWS, KeyTimes, begin_keys, keys_step
+from fingers_robot.behaviour.keyboard.keys import (
+    ARROWS,
+    KeyTimes,
+    begin_keys,
+    keys_step,
+)
 
 DT_S = 0.02
 TIMES = KeyTimes(idle_s=0.1, timeout_s=0.3)

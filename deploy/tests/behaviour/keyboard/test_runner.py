@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from fingers_deploy.errors import InputError
-from fingers_robot.behaviour.key_runner import KeyRunner
-from fingers_robot.behaviour.keyboard import Keyboard
-from fingers_robot.behaviour.keys import ARROWS
+from fingers_robot.behaviour.keyboard.events import Keyboard
+from fingers_robot.behaviour.keyboard.keys import ARROWS
+from fingers_robot.behaviour.keyboard.runner import KeyRunner
 
 DT = 0.02
 

@@ -5,8 +5,8 @@ import dataclasses
 import numpy as np
 from numpy.typing import NDArray
 
-from fingers_robot.behaviour.keyboard import KeySource
-from fingers_robot.behaviour.keys import (
+from fingers_robot.behaviour.keyboard.events import KeySource
+from fingers_robot.behaviour.keyboard.keys import (
     ARROWS,
     KeyTimes,
     begin_keys,

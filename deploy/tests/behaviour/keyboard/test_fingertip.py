@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingers_deploy.fingertip import FIRST_JOINT, pressing_fingertip
+from fingers_robot.behaviour.keyboard.fingertip import FIRST_JOINT, pressing_fingertip
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

@@ -1,0 +1,1 @@
+"""Pressing keys: which key when, key events, and the finger that presses."""
