@@ -126,18 +126,15 @@ class ConsoleRun:
 
 def energize(run: ConsoleRun, seconds: float = 60.0) -> float:
     """Arms until it is taken; returns when the hand was energized [s]."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        t = run.type("arm\n")
-        while time.monotonic() - t < 0.6:
-            for words in ("disabled -> arming", "arm refused"):
-                if (at := run.said(words, t)) is not None:
-                    break
-            else:
-                time.sleep(0.005)
-                continue
-            if words == "disabled -> arming":
+    begun_s = time.monotonic()
+    while time.monotonic() < begun_s + seconds:
+        asked_s = run.type("arm\n")
+        while time.monotonic() - asked_s < 0.6:
+            # An answer that came late is one to an earlier word.
+            if (at := run.said("disabled -> arming", begun_s)) is not None:
                 return at
-            break
+            if run.said("arm refused", asked_s) is not None:
+                break
+            time.sleep(0.005)
         time.sleep(0.3)
-    raise TimeoutError(f"not armed: {run.lines}")
+    raise TimeoutError(f"not armed: {run.lines[-20:]}")
