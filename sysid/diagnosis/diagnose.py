@@ -81,7 +81,9 @@ def _examined(
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
     result = search(problem)
-    return Examined(result.problem.data, result.problem, result)
+    decided = result.problem
+    equations = getattr(decided, "equations", None) or decided
+    return Examined(decided.data, equations, result)
 
 
 def problem_of(

@@ -15,15 +15,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
-from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
+from sysid.diagnosis.replay import band, command
 from sysid.diagnosis.replay.command import command_path
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.search.problem import LANES, Problem
 
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
@@ -35,7 +37,7 @@ WINDOW_S = 0.5
 def simulated(
     problem: Problem, thetas: Float[np.ndarray, "c n"]
 ) -> Float[np.ndarray, "c t p"]:
-    """Encoder angles y of candidates, from measured starts.
+    """Encoder angles y of candidates, from measured starts, smoothed as the track is.
 
         (μ I + J) q̈ = τ + τ_load − b q̇ − F sign q̇,   y = f(q)
 
@@ -54,27 +56,32 @@ def simulated(
     """
     dt = problem.data.dt
     substeps = max(1, int(np.ceil(dt / SUBSTEP_S)))
-    params, nuisance = problem.space.values(thetas)
     driven = problem.known == "mechanics"
     steps = len(problem.data.track.cmd)
     window = max(round(WINDOW_S / dt), 8) if driven else steps
-    fixed = (dt / substeps, substeps, problem.space.effects, window, driven)
-    angles = _simulated(problem.data.track, params, nuisance, *fixed)
-    return np.moveaxis(np.asarray(angles, float), 2, 0)
+    fixed = (dt / substeps, substeps, _acting(problem.space, thetas), window, driven)
+    parts = []
+    for first in range(0, len(thetas), LANES):
+        some = thetas[first : first + LANES]
+        lanes = np.concatenate([some, np.repeat(some[:1], LANES - len(some), 0)])
+        params, nuisance = problem.space.values(lanes)
+        angles = _simulated(problem.data.track, params, nuisance, *fixed)
+        parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[: len(some)])
+    return np.concatenate(parts)
 
 
-def sharp_angle(track: Track, dt: float) -> Float[np.ndarray, "t p"]:
-    """Measured angle before its smoothing of variance σ²: y ≈ y_s − ½ σ² ÿ_s [rad].
+def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
+    """Effects that any candidate has: those at their identity cost time alone.
 
-    Args:
-        track: of the joint.
-        dt: step of the grid [s].
-
-    Source:
-        Ours; a Gaussian adds ½ σ² ÿ to first order.
+    Rounded up to half a dozen, so that few different programs are compiled.
     """
-    half = 0.5 * (SMOOTH_STEPS * dt) ** 2
-    return np.asarray(track.pos, float) - half * np.asarray(track.acc, float)
+    away = {
+        slot.effect
+        for i, slot in enumerate(space.slots)
+        if slot.effect and np.any(thetas[:, i] != 0.0)
+        if CATALOGUE[slot.effect].parameters[slot.name].identity is not None
+    }
+    return tuple(n for n in space.effects if n in away or n in command.EFFECTS)
 
 
 @flax.struct.dataclass
@@ -117,8 +124,9 @@ def _simulated(
         joint = JointInput(target, q, qd, load, kp, kd, around)
         states, x = chain_step(chain(now), states, joint, dt)
         x = replace(x, damping=x.damping * (1.0 - float(driven)))
-        q, qd = joint_step(x, mass * now.inertia, dt)
-        return states, q, qd, x.encoder
+        moved, qd = joint_step(x, mass * now.inertia, dt)
+        # The chain read the encoder before the joint moved.
+        return states, moved, qd, x.encoder + moved - q
 
     def step(carry, row):
         now = with_candidates(row[0])
@@ -133,7 +141,7 @@ def _simulated(
     start = (states, q0, qd0, q0)
     angles = jax.lax.scan(step, start, (cut.motion, cut.target))[1]
     whole = angles.reshape(window, -1, pieces, count)
-    return jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps]
+    return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
 
 
 def _targets(track: Track, params, dt: float, substeps: int, count: int):

@@ -19,7 +19,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.replay.band import EVERY, sample_rows
 from sysid.diagnosis.search.candidate import Model, fit_models
-from sysid.diagnosis.search.closed_loop import sharp_angle, simulated
+from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.parameters import Slot, Space
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.space import SIGMA
@@ -69,7 +69,7 @@ class Judge:
         if id(model) not in self.errors:
             problem = self.problem
             rows = sample_rows(len(problem.data.track.cmd))
-            measured = sharp_angle(problem.data.track, problem.data.dt)
+            measured = np.asarray(problem.data.track.pos, float)
             each = (measured - simulated(problem, model.fold_theta))[:, rows]
             error = np.take_along_axis(each, problem.fold[None], 0)[0]
             self.errors[id(model)] = (model, np.nan_to_num(error, nan=np.inf))

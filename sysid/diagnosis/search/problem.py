@@ -8,6 +8,7 @@ and a candidate's residual that is larger counts with its correlation in time.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -33,14 +34,14 @@ from sysid.logs.log import MeasuredLog
 LANES = 64
 """Number of candidates that are evaluated at once."""
 
-CHANNELS = ("controller", "mechanics")
-
 
 @dataclass(frozen=True, eq=False)
 class Problem:
     """Residuals of one joint and how they count.
 
     Attributes:
+        channels: names of the two residuals.
+        amplifies: whether a candidate may amplify the noise of the readings.
         data: the joint's track.
         space: coordinates of the candidates.
         valid: where the two residuals count (2, m, p).
@@ -51,6 +52,8 @@ class Problem:
         known: which part of the joint can be examined; see `JointDrive`.
     """
 
+    channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
+    amplifies: ClassVar[bool] = True
     data: JointTrack
     space: Space
     valid: Bool[np.ndarray, "2 m p"]

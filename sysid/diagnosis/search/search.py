@@ -12,9 +12,10 @@ from functools import cached_property
 import numpy as np
 
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
+from sysid.diagnosis.search.candidate import Model, fit_models, lag, log_likelihood_gain
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
+from sysid.diagnosis.search.output_error import output_problem
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, extended
@@ -47,10 +48,10 @@ class Search:
     without: dict[str, Model]
     samples: int
 
-    def gain(self, cause: str, model: Model | None = None) -> float:
-        """Log-likelihood gain of a model, else the best, over that without a cause."""
+    def gain(self, cause: str) -> float:
+        """Log-likelihood gain of the best model over that without a cause."""
         without = self.without.get(cause, self.base)
-        return log_likelihood_gain(without, model or self.best, self.samples)
+        return log_likelihood_gain(without, self.best, self.samples)
 
     @cached_property
     def judge(self) -> Judge:
@@ -86,6 +87,11 @@ def search(problem: Problem) -> Search:
     """
     problem, base = settled(problem)
     problem = coupled(problem, base)
+    output = output_problem(problem)
+    if output is not None:
+        start = problem.space.nominal
+        problem = output.with_noise(output.raw(start[None])[0])
+        base = fit_models(problem, [()], [start])[0]
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found
@@ -206,12 +212,12 @@ def exchanged(
             best = without[idle[0]]
             continue
         for cause, stage in others.items():
-            gain = log_likelihood_gain(without[cause], best, samples)
+            gain = lag(without[cause], best, samples)
             least = max(3.0, NESTED_SHARE * gain)
             better = [
                 m
                 for m in stage
-                if log_likelihood_gain(best, m, samples) > least
+                if lag(best, m, samples) > least
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
             ]

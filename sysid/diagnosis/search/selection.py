@@ -13,7 +13,7 @@ from sysid.diagnosis.search.candidate import (
     log_likelihood_gain,
     off_prior,
 )
-from sysid.diagnosis.search.problem import CHANNELS, Problem
+from sysid.diagnosis.search.problem import Problem
 
 LEAST_SHARE = 0.03
 """Least share of the held-out error above noise that a cause must remove."""
@@ -81,7 +81,7 @@ def explained_gain(
     """
     gained = _parts(problem, base) - _parts(problem, smaller)
     k = _strongest(problem, smaller, larger)
-    return 0.5 * float(gained.sum() if k == len(CHANNELS) else gained[k])
+    return 0.5 * float(gained.sum() if k == len(problem.channels) else gained[k])
 
 
 def _parts(problem: Problem, model: Model) -> Float[np.ndarray, "3"]:

@@ -5,8 +5,10 @@ from sysid.diagnosis.search.candidate import (
     Model,
     at_nominal,
     fit_models,
+    lag,
     log_likelihood_gain,
 )
+from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
 from sysid.diagnosis.search.starts import starts_of
@@ -26,8 +28,33 @@ NESTED_SHARE = 0.015
 gives in dry friction before it slips is less than an encoder resolves."""
 
 
+OUTPUT_TRIED = 6
+"""Number of candidates of a stage that are fitted to the angle."""
+
+
 def extended(problem: Problem, model: Model) -> list[Model]:
     """Adds every effect that a model lacks, best first."""
+    if not isinstance(problem, OutputProblem):
+        return _extended(problem, model)
+    first = _from_equations(problem, model)
+    # Without an effort all torques together may grow: what that valley took up is left.
+    starts = [at_nominal(problem, m) for m in first]
+    models = fit_models(problem, [m.effects for m in first], starts)
+    return _simplest_first(problem, model, _ordered(problem, model, models))
+
+
+def _from_equations(problem: OutputProblem, model: Model) -> list[Model]:
+    """Returns what the equations propose; they are asked once."""
+    equations, effects = problem.equations, model.effects
+    assert equations is not None
+    if effects not in problem.stages:
+        smaller = fit_models(equations, [effects], [model.fit.theta])[0]
+        problem.stages[effects] = _extended(equations, smaller)[:OUTPUT_TRIED]
+    return problem.stages[effects]
+
+
+def _extended(problem: Problem, model: Model) -> list[Model]:
+    """Adds every effect, by the equations."""
     names = [e for e in problem.space.effects if _fits_in(e, model.effects)]
     sets = [(*model.effects, name) for name in names]
     starts = starts_of(problem, model, names)
@@ -55,14 +82,12 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     each other: from there every step leaves a narrow, curved valley. So those fits are
     continued from nominal too.
     """
-
-    def order(m: Model) -> float:
-        return -log_likelihood_gain(smaller, m, problem.samples)
-
     near = sorted(stage, key=lambda m: m.fit.cost)[:REFINED]
-    ranked = sorted(stage, key=order)
-    far = 0.9 * order(ranked[0]) if ranked else 0.0
-    close = ranked[:REFINED] + [m for m in ranked[REFINED:] if order(m) < far]
+    ranked = _ordered(problem, smaller, stage)
+    gains = [log_likelihood_gain(smaller, m, problem.samples) for m in ranked]
+    far = 0.9 * max(gains, default=0.0)
+    close = ranked[:REFINED]
+    close += [m for m, g in list(zip(ranked, gains, strict=True))[REFINED:] if g > far]
     near += [m for m in close if m not in near]
     jobs = [(m.effects, m.fit.theta) for m in near]
     jobs += [
@@ -73,7 +98,13 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=10)
     models = sorted(models, key=lambda m: -m.fit.cost)
     again = {m.effects: m for m in models}  # the last one is the best
-    return sorted((again.get(m.effects, m) for m in stage), key=order)
+    return _ordered(problem, smaller, [again.get(m.effects, m) for m in stage])
+
+
+def _ordered(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
+    """Sorts candidates, that with the largest likelihood first."""
+    least = min(stage, key=lambda m: m.score, default=smaller)
+    return sorted(stage, key=lambda m: lag(m, least, problem.samples))
 
 
 def _simplest_first(
@@ -83,19 +114,17 @@ def _simplest_first(
     if not stage:
         return stage
     samples = problem.samples
-    gains = {m.effects: log_likelihood_gain(smaller, m, samples) for m in stage}
-    most, best = gains[stage[0].effects], stage[0].effects[-1]
+    most, best = lag(smaller, stage[0], samples), stage[0].effects[-1]
 
     def tie(m: Model) -> bool:
-        behind = most - gains[m.effects]
+        behind = lag(m, stage[0], samples)
         if best not in NESTED.get(m.effects[-1], ()):
             return behind < max(3.0, MODEL_ERROR * most)
         # The model error of large friction is no sign that it falls with speed.
-        lacks = log_likelihood_gain(m, stage[0], samples)
-        return behind < max(3.0, NESTED_SHARE * most) or lacks < MODEL_ERROR * most
+        return behind < max(3.0, NESTED_SHARE * most)
 
     tied = [m for m in stage if tie(m)]
     first = min(
-        tied, key=lambda m: (len(problem.space.of(m.effects[-1])), -gains[m.effects])
+        tied, key=lambda m: (len(problem.space.of(m.effects[-1])), tied.index(m))
     )
     return [first, *(m for m in stage if m is not first)]

@@ -3,6 +3,7 @@
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
+from sysid.diagnosis.search.candidate import lag
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import THRESHOLD
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE
@@ -31,12 +32,12 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     One that contains the cause at an end of its shape, as dry friction with a
     presliding range of zero, is no alternative to it.
     """
-    gain = evidence(found, cause)
     result = []
     without = found.without.get(cause, found.base)
+    gain = lag(without, found.best, found.samples)
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
-        gap = gain - found.gain(cause, model)
+        gap = lag(model, found.best, found.samples)
         distinct = gap > max(DISTINCT, NESTED_SHARE * gain)
         distinct = distinct or effect in NESTED.get(cause, ())
         # Chance alone gives some effects as much as a nominal value's small step.

@@ -24,7 +24,7 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
         seed: of the bootstrap over blocks of time.
     """
     gains, base = {}, found.judge.nominal(found.base)
-    for name, k in (("controller", 0), ("mechanics", 1)):
+    for k, name in enumerate(found.problem.channels):
         if found.problem.valid[k].any():
             before, after = (_heldout(found.problem, m, k) for m in (base, found.best))
             valid = found.problem.valid[k]

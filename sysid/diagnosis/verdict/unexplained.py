@@ -19,7 +19,7 @@ import numpy as np
 from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.search.candidate import log_likelihood_gain
 from sysid.diagnosis.search.parameters import Slot
-from sysid.diagnosis.search.problem import CHANNELS, Problem
+from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import EXCESS, Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
 
@@ -54,7 +54,7 @@ def _remaining(found: Search) -> list[str]:
     texts = []
     if not found.problem.repeat:
         return texts
-    for k, name in enumerate(CHANNELS):
+    for k, name in enumerate(found.problem.channels):
         before, after = found.base.errors[k], found.best.errors[k]
         if after > EXCESS and after - 1.0 > REMAINING * (before - 1.0):
             times = np.sqrt(after)
@@ -117,7 +117,7 @@ def _irregular(found: Search) -> list[str]:
         return []
     raw = problem.raw(found.best.fit.theta[None])[0]
     texts = []
-    for k, name in enumerate(CHANNELS):
+    for k, name in enumerate(problem.channels):
         sticks = name == "mechanics" and found.best.effects
         if not sticks and _jumps(problem, raw[k], k):
             texts.append(f"the {name} residual has jumps that do not repeat")

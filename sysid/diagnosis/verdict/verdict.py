@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.search.problem import CHANNELS
 from sysid.diagnosis.search.search import Examined
 from sysid.diagnosis.verdict.alternatives import alternatives_of
 from sysid.diagnosis.verdict.causes import causes_of, evidence
@@ -117,14 +116,15 @@ def _leading(searched: Sequence[Examined], causes: Sequence[Cause]) -> Examined:
 
 
 def _largest(gains: dict[str, Gain]) -> Gain | None:
-    """Chooses the gain of the residual that differed most, of those that fall."""
+    """Chooses the gain that differed most, of the equations' residuals if they fall."""
 
     def differs(gain: Gain) -> float:
         return gain.heldout_rmse_before / (gain.noise_floor or gain.heldout_rmse_after)
 
+    equations = [gain for name, gain in gains.items() if name != "position"]
     fall = [
         gain
-        for name, gain in gains.items()
-        if name in CHANNELS and gain.heldout_rmse_after < gain.heldout_rmse_before
+        for gain in equations or gains.values()
+        if gain.heldout_rmse_after < gain.heldout_rmse_before
     ]
     return max(fall, key=differs, default=None)
