@@ -13,8 +13,11 @@ from sysid.mechanism import Mechanism
 PAYLOAD = "payload"
 """Name of the body that carries the load, where there is one."""
 
-_EVERY = 4
-"""Rows between two postures that are evaluated; joints move little in between."""
+_MOST = 4
+"""Largest number of rows between two postures that are evaluated."""
+
+_CHORD_RAD = 5e-4
+"""Largest distance of a joint from the straight line between two such postures."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +123,8 @@ def bodies_along(
     """M(q) q̈ + c(q, q̇) = τ + m(q) · g, its terms for each joint along a motion.
 
     The push of the others is M_ii q̈_i − Σ_k M_ik q̈_k − c_i. Postures change slowly from
-    row to row: every fourth is evaluated, the others lie on straight lines between.
+    row to row: where they bend little up to every fourth is evaluated, the others lie on
+    straight lines between.
 
     Args:
         mechanism: the simulation as it stands.
@@ -137,7 +141,7 @@ def bodies_along(
     body = model.jnt_bodyid[ids]
     payload = _payload(model, body)
     count = len(motion.pos)
-    rows = np.unique(np.append(np.arange(0, count, _EVERY), count - 1))
+    rows = np.unique(np.append(np.arange(0, count, _apart(motion.pos)), count - 1))
     f = _evaluated(model, ids, payload, motion, rows)
     hinge = (model.jnt_type[ids] == int(mujoco.mjtJoint.mjJNT_HINGE))[:, None]
     mass = model.body_subtreemass[body][:, None]
@@ -191,6 +195,12 @@ def _evaluated(
             _coriolis(model, data)[dof] if len(dof) > 1 else np.zeros(1)
         )
     return {key: np.array(values) for key, values in found.items()}
+
+
+def _apart(pos: Float[np.ndarray, "n j"]) -> int:
+    """Rows between postures: a chord over k rows misses a bend Δ²q by k² Δ²q / 8."""
+    bend = float(np.max(np.abs(np.diff(pos, 2, axis=0)), initial=0.0))
+    return int(np.clip(np.sqrt(8.0 * _CHORD_RAD / max(bend, 1e-12)), 1, _MOST))
 
 
 def interpolated(
