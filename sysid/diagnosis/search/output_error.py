@@ -1,0 +1,117 @@
+"""The output error of one joint as a least-squares problem, where no effort was logged.
+
+Without an effort the equations lack a side: the servo's torque is what its law makes of
+angles that were read at moments, and their derivatives. The simulated angle needs
+neither. So candidates come from the equations, whose residual is quick and smooth, and
+are then fitted to the angle, and compared by it.
+"""
+
+from dataclasses import dataclass, field, fields, replace
+from typing import ClassVar
+
+import numpy as np
+from jaxtyping import Float
+
+from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.search.closed_loop import simulated
+from sysid.diagnosis.search.noise_floor import difference_noise
+from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.whitening import Noise, autoregressive, correlation_time
+
+FAR = 1e3
+"""Largest error that counts, in units of the angle's size: of unstable candidates."""
+
+
+@dataclass(frozen=True, eq=False)
+class OutputProblem(Problem):
+    """The error of the simulated angle in the place of the equations' residuals.
+
+    Attributes:
+        equations: the residuals from which its candidates come.
+        stages: candidates that came from them, by the effects of the smaller model.
+    """
+
+    channels: ClassVar[tuple[str, str]] = ("", "position")
+    amplifies: ClassVar[bool] = False
+    equations: Problem | None = None
+    stages: dict[tuple[str, ...], list] = field(default_factory=dict)
+
+    def raw(
+        self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
+    ) -> Float[np.ndarray, "c 2 m p"]:
+        """Output errors r(θ) = y − ŷ(θ) of candidates, in the second channel.
+
+        Args:
+            thetas: coordinates of candidates, in units of their scales [1].
+            weigh: not used; every sample weighs as much.
+
+        Returns:
+            Nothing and the error of the angle [rad].
+
+        Source:
+            Output-error method: L. Ljung, System Identification: Theory for the User,
+            1999, section 4.2.
+        """
+        track = self.data.track
+        rows = sample_rows(len(track.cmd))
+        measured, most = np.asarray(track.pos, float), FAR * self.data.angle_scale
+        error = (measured - simulated(self, thetas))[:, rows]
+        error = np.clip(np.nan_to_num(error, nan=most), -most, most)
+        error = np.where(self.valid[1], error, 0.0)
+        return np.stack([np.zeros_like(error), error], 1)
+
+    def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
+        """Takes the noise from the repeats of the error, else from its neighbours.
+
+        Args:
+            raw: errors of one candidate [rad].
+
+        Returns:
+            The problem with its noise [rad].
+
+        Source:
+            Ours; as `Problem.with_noise`.
+        """
+        valid = self.valid[1]
+        if self.repeat:
+            noise = autoregressive(*self.repeat.differences(raw[1], valid))
+        else:
+            readings = np.array([self.data.noise[0] ** 2, 0.0, 0.0])
+            noise = Noise(np.zeros(0), difference_noise(raw[1], valid, readings))
+        return replace(self, noise=(self.noise[0], noise))
+
+    def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
+        """Takes what a model leaves as noise: s'² = max(s_y², τ mean r²).
+
+        Args:
+            raw: its errors [rad].
+
+        Returns:
+            The problem with white noise of that size, at least that of the readings.
+
+        Source:
+            Ours; as `Problem.with_remaining`, but what neighbours of a large smooth
+            error do not share is not noise.
+        """
+        r, valid = raw[1], self.valid[1]
+        size = np.sqrt(correlation_time(r, valid) * np.mean(r[valid] ** 2))
+        known = Noise(np.zeros(0), max(float(size), self.data.noise[0], 1e-12))
+        return replace(self, noise=(self.noise[0], known))
+
+
+def output_problem(problem: Problem) -> OutputProblem | None:
+    """Makes the output error of a joint; None where the equations decide.
+
+    They do where efforts were logged, and where a law or a force is not known.
+
+    Args:
+        problem: the equations' residuals.
+    """
+    data = problem.data
+    if problem.known != "both" or data.effort.any() or not data.valid.any():
+        return None
+    same = {f.name: getattr(problem, f.name) for f in fields(Problem)}
+    seen = np.stack([np.zeros_like(data.valid), data.valid])
+    white = (Noise(np.zeros(0), 1.0),) * 2
+    changed = {"valid": seen, "noise": white, "weight": np.ones(seen.shape)}
+    return OutputProblem(**same | changed, equations=problem)
