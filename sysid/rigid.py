@@ -123,7 +123,7 @@ def bodies_along(
     """M(q) q̈ + c(q, q̇) = τ + m(q) · g, its terms for each joint along a motion.
 
     The push of the others is M_ii q̈_i − Σ_k M_ik q̈_k − c_i. Postures change slowly from
-    row to row: where they bend little up to every fourth is evaluated, the others lie on
+    row to row: where they bend little every fourth is evaluated, and the others lie on
     straight lines between.
 
     Args:

@@ -35,6 +35,14 @@ def test_a_pendulum_weighs_as_its_sine():
     assert bodies.inertia == pytest.approx(inertia, rel=1e-5)
 
 
+def test_slow_rows_do_not_cut_corners():
+    """At 50 Hz four rows of a quick swing are a wide chord."""
+    q = np.sin(12.0 * np.arange(0.0, 2.0, 0.02))[:, None]
+    gravity = mount_gravity(pendulum(), UPRIGHT)
+    bodies = bodies_along(pendulum(), ("a",), at_rest(q), gravity)
+    assert bodies.weight == pytest.approx(-MASS * G * LENGTH * np.sin(q), abs=1e-6)
+
+
 def test_nothing_pushes_a_joint_that_is_alone():
     rng = np.random.default_rng(0)
     motion = JointMotion(*rng.normal(size=(3, 50, 1)))

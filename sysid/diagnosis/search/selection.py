@@ -81,7 +81,7 @@ def explained_gain(
     """
     gained = _parts(problem, base) - _parts(problem, smaller)
     k = _strongest(problem, smaller, larger)
-    return 0.5 * float(gained.sum() if k == len(problem.channels) else gained[k])
+    return 0.5 * float(gained.sum() if k == len(gained) - 1 else gained[k])
 
 
 def _parts(problem: Problem, model: Model) -> Float[np.ndarray, "3"]:

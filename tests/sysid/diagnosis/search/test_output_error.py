@@ -1,0 +1,87 @@
+"""The output error: which records it decides, its noise, and how rivals compare."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from support.plain_servo import problem_with
+
+from sysid.diagnosis.search.candidate import fit_models, lag
+from sysid.diagnosis.search.output_error import output_problem
+from sysid.diagnosis.search.whitening import Noise
+
+
+def silent(late_s=0.0):
+    """The equations of a servo whose effort was not logged."""
+    problem = problem_with(late_s)
+    problem.data.effort[:] = False
+    return problem
+
+
+def test_it_decides_where_no_effort_was_logged():
+    assert output_problem(problem_with()) is None
+    assert output_problem(problem_with(known="mechanics")) is None
+    assert output_problem(silent()).equations is not None
+
+
+def test_its_residual_is_the_error_of_the_angle():
+    output = output_problem(silent(0.01))
+    raw = output.raw(output.space.nominal[None])[0]
+    assert np.all(raw[0] == 0.0)
+    size = float(np.sqrt(np.mean(raw[1][output.valid[1]] ** 2)))
+    assert 5e-3 < size < 0.05
+    assert output.channel_counts()[0] == 0
+    assert output.samples == int(output.valid[1].sum())
+
+
+def test_what_an_error_leaves_is_noise_but_never_less_than_the_readings():
+    output = output_problem(silent())
+    rng = np.random.default_rng(0)
+    left = np.stack([np.zeros(output.fold.shape), rng.normal(size=output.fold.shape)])
+    assert output.with_remaining(3.0 * left).noise[1].deviation == pytest.approx(
+        3.0, rel=0.5
+    )
+    readings = output.data.noise[0]
+    assert output.with_remaining(0.0 * left).noise[1].deviation >= readings
+
+
+def test_a_fit_to_the_angle_finds_a_delay_that_equations_only_guess():
+    output = output_problem(silent(0.01))
+    output = output.with_remaining(np.full((2, *output.fold.shape), 3e-4))
+    index = output.space.of("transport_delay")[0]
+    start = output.space.nominal.copy()
+    start[index] = 0.012 / output.space.slots[index].scale
+    found = fit_models(output, [("transport_delay",)], [start])[0]
+    delay_s = float(output.space.slots[index].value(found.fit.theta[index]))
+    assert delay_s == pytest.approx(0.01, abs=2e-4)
+
+
+def rival(score, tau=1.0, samples=100):
+    variance = max(1.0, tau * score / samples)
+    return SimpleNamespace(
+        score=score, correlation=tau, noise_cost=0.0, variance=lambda _: variance
+    )
+
+
+def test_rivals_that_are_alike_stay_so_however_much_both_explain():
+    """A per cent of the error is half a sample's worth of evidence per hundred."""
+    close = lag(rival(1010.0), rival(1000.0), 100)
+    assert close == pytest.approx(50.0 * np.log(1.01))
+    assert lag(rival(1000.0), rival(1010.0), 100) == pytest.approx(-close)
+    assert lag(rival(2000.0), rival(1000.0), 100) > 30.0
+    # Known noise is the least variance: ratios of smaller errors say nothing.
+    assert lag(rival(20.0), rival(10.0), 100) == pytest.approx(50.0 * np.log(1.1))
+    assert lag(rival(np.inf), rival(1.0), 100) == np.inf
+
+
+def test_correlated_errors_count_less():
+    once = lag(rival(2000.0), rival(1000.0), 100)
+    assert lag(rival(2000.0, 10.0), rival(1000.0, 10.0), 100) < 0.2 * once
+
+
+def test_noise_is_white_without_repeats():
+    output = output_problem(silent())
+    noisy = output.with_noise(output.raw(output.space.nominal[None])[0])
+    assert isinstance(noisy.noise[1], Noise)
+    assert len(noisy.noise[1].a) == 0
+    assert noisy.noise[1].deviation > 0.0
