@@ -13,10 +13,16 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
 from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.whitening import Noise, autoregressive, correlation_time
+from sysid.diagnosis.search.whitening import (
+    Noise,
+    autoregressive,
+    bulk_deviation,
+    correlation_time,
+)
 
 FAR = 1e3
 """Largest error that counts, in units of the angle's size: of unstable candidates."""
@@ -43,7 +49,7 @@ class OutputProblem(Problem):
 
         Args:
             thetas: coordinates of candidates, in units of their scales [1].
-            weigh: not used; every sample weighs as much.
+            weigh: whether to apply the weights of uncertain samples.
 
         Returns:
             Nothing and the error of the angle [rad].
@@ -58,27 +64,39 @@ class OutputProblem(Problem):
         error = (measured - simulated(self, thetas))[:, rows]
         error = np.clip(np.nan_to_num(error, nan=most), -most, most)
         error = np.where(self.valid[1], error, 0.0)
-        return np.stack([np.zeros_like(error), error], 1)
+        weight = self.weight if weigh else 1.0
+        return np.stack([np.zeros_like(error), error], 1) * weight
 
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes the noise from the repeats of the error, else from its neighbours.
 
+        When a servo takes a target is known to its cycle, so an angle that moves at
+        speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²).
+
         Args:
-            raw: errors of one candidate [rad].
+            raw: errors of one candidate, without weights [rad].
 
         Returns:
-            The problem with its noise [rad].
+            The problem with noise [rad] and weights [1].
 
         Source:
             Ours; as `Problem.with_noise`.
         """
-        valid = self.valid[1]
+        valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
+        unsure = CYCLE_S * np.abs(np.asarray(self.data.track.vel, float)[rows])
         if self.repeat:
-            noise = autoregressive(*self.repeat.differences(raw[1], valid))
+            series, counts = self.repeat.differences(raw[1], valid)
+            size = bulk_deviation(series[counts]) if counts.any() else 1.0
+            weight = 1.0 / np.hypot(1.0, unsure / size)
+            found = self.repeat.differences(weight * raw[1], valid)
+            noise = autoregressive(*found)
         else:
             readings = np.array([self.data.noise[0] ** 2, 0.0, 0.0])
-            noise = Noise(np.zeros(0), difference_noise(raw[1], valid, readings))
-        return replace(self, noise=(self.noise[0], noise))
+            size = difference_noise(raw[1], valid, readings)
+            weight = 1.0 / np.hypot(1.0, unsure / size)
+            noise = Noise(np.zeros(0), size)
+        weights = np.stack([np.ones_like(weight), weight])
+        return replace(self, noise=(self.noise[0], noise), weight=weights)
 
     def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes what a model leaves as noise: s'² = max(s_y², τ mean r²).

@@ -91,7 +91,7 @@ def search(problem: Problem) -> Search:
     if output is not None:
         start = problem.space.nominal
         problem = output.with_noise(output.raw(start[None])[0])
-        base = fit_models(problem, [()], [start])[0]
+        base = fit_models(problem, [()], [start], rounds=10)[0]
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found
