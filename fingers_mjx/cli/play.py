@@ -12,7 +12,7 @@ from fingers_mjx.cli import options
 from fingers_mjx.play.sokoban import LEVELS, SOLUTIONS, Board, read_level
 
 if TYPE_CHECKING:
-    from envs.tasks.keyboard.settings import KeyboardConfig
+    from envs.config.settings.keyboard import KeyboardConfig
     from fingers_deploy import Bundle
     from fingers_mjx.play.episodes import Session
     from fingers_mjx.play.player import Player
