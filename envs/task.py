@@ -201,7 +201,7 @@ class HandTask(ABC):
         """Prepares the task's fields for the next step, such as a new command: nothing.
 
         All that inputs and signals depend on changes here, and not in `magnitudes`:
-        the closed loop in C MuJoCo knows no rewards.
+        the closed loop in C MuJoCo pays no rewards.
         """
         del signals
         return memory

@@ -32,8 +32,15 @@ def add(commands) -> None:
         "environment takes no part.",
         computes=False,
     )
-    what = "bundle directory or policy.onnx"
-    options.path(parser, "bundle", metavar="BUNDLE", help=what)
+    what = "bundle directory or policy.onnx; --viewer takes the committed crawl policy"
+    options.path(parser, "bundle", metavar="BUNDLE", nargs="?", help=what)
+    parser.add_argument(
+        "--viewer",
+        action="store_true",
+        help="a page in the browser, with knobs, until Ctrl-C; see docs/guides/viewer.md",
+    )
+    options.value(parser, "--port", options.whole(1024, 65535), 8080, "of the page")
+    options.path(parser, "--ghost", metavar="LOG", help="a measured log on the page")
     options.path(
         parser,
         "--then",
@@ -102,6 +109,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--video", "suffix", args.video.suffix, valid)
     options.check_file("--json", args.json)
     options.check_file("--video", args.video)
+    if args.viewer:
+        return _watch(args)
+    if args.bundle is None:
+        raise InputError("play", "BUNDLE", "nothing", "an exported bundle, or --viewer")
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
     player = _player(args, setup, bundle)
@@ -123,6 +134,23 @@ def run(args: argparse.Namespace) -> int:
         print("first episode:", story(played.first, player.env.dt, _then_name(args)))
     if isinstance(player, KeyPlayer):
         print("keys:", keys_story(player.results, start_board(args)))
+    return 0
+
+
+def _watch(args: argparse.Namespace) -> int:
+    """Serves the page until Ctrl-C."""
+    from fingers_mjx.demo.demo import POLICY_DIR
+    from fingers_mjx.play.viewer.watch import Watched, watch
+    from fingers_mjx.policy.source import load_bundle_setup
+    from fingers_mjx.training.compile_cache import use_compile_cache
+    from sysid.logs.read import read_log
+
+    use_compile_cache()
+    bundle, trained = load_bundle_setup(args.bundle or POLICY_DIR)
+    log = None if args.ghost is None else read_log(args.ghost)
+    command = tuple(args.commands[0]) if args.commands else None
+    setup = _setup(args, trained)
+    watch(Watched(setup, bundle, args.runtime, args.seed, command, log), args.port)
     return 0
 
 
