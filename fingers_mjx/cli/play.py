@@ -37,7 +37,7 @@ def add(commands) -> None:
     parser.add_argument(
         "--viewer",
         action="store_true",
-        help="a page in the browser, with knobs, until Ctrl-C; see docs/guides/viewer.md",
+        help="a page in the browser, with knobs, until Ctrl-C",
     )
     options.value(parser, "--port", options.whole(1024, 65535), 8080, "of the page")
     options.path(parser, "--ghost", metavar="LOG", help="a measured log on the page")
@@ -148,9 +148,19 @@ def _watch(args: argparse.Namespace) -> int:
     use_compile_cache()
     bundle, trained = load_bundle_setup(args.bundle or POLICY_DIR)
     log = None if args.ghost is None else read_log(args.ghost)
-    command = tuple(args.commands[0]) if args.commands else None
-    setup = _setup(args, trained)
-    watch(Watched(setup, bundle, args.runtime, args.seed, command, log), args.port)
+    command = None
+    if args.commands and args.then is None:  # the page has sliders for it
+        command, args.commands = tuple(args.commands[0]), None
+    setup, name = _setup(args, trained), (args.bundle or POLICY_DIR).name
+    watched = Watched(
+        f"{trained.train.task}: {name}",
+        setup,
+        lambda setup: _player(args, setup, bundle),
+        args.seed,
+        command,
+        log,
+    )
+    watch(watched, args.port)
     return 0
 
 

@@ -16,7 +16,7 @@ OKABE_ITO: tuple[Rgb, ...] = (
     (86, 180, 233),
 )
 """For fingers that look alike; the colour-blind tell them apart."""
-FORCE: Rgb = (213, 60, 40)
+FORCE: Rgb = (200, 20, 0)
 PUSH: Rgb = (140, 40, 160)
 GHOST: Rgb = (60, 130, 220)
 AXES: tuple[Rgb, ...] = ((240, 0, 0), (0, 200, 0), (0, 0, 240))

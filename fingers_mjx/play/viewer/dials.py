@@ -18,7 +18,7 @@ BESIDE, HEIGHT = 62, 96
 def dials(lifts: Lifts | None, colours: Sequence[Rgb]) -> str:
     """Returns the dials as HTML.
 
-    A finger's hand is its average z, red-hot in its colour where it is paid; the thin
+    A finger's hand is its average z, and a thick ring says that it is paid; the thin
     hand is the phase φ that all share. The circles are z_min and z_max.
 
     Args:

@@ -95,8 +95,7 @@ class Live:
         episode = self._episode
         self._note_command(wishes.command)
         force_w = self._push(wishes)
-        command = None if wishes.command is None else np.float32(wishes.command)
-        row = self._player.step(episode, command)
+        row = self._player.step(episode, wishes.command_v)
         self.time_s += self.dt_s
         self._lying = int(bool(row.done))
         view = view_of(episode, row)
@@ -109,7 +108,7 @@ class Live:
         episode, task = self._episode, self._player.env.task
         if command is None or not isinstance(task, Walking):
             return
-        if not np.array_equal(np.float32(command), episode.memory.command):
+        if not np.array_equal(np.array(command, np.float32), episode.memory.command):
             fresh = task.begin_with_command()
             episode.memory = dataclasses.replace(episode.memory, **fresh)
 

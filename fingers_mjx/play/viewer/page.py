@@ -2,6 +2,7 @@
 
 import contextlib
 import io
+import logging
 import socket
 from collections.abc import Iterator
 
@@ -17,6 +18,9 @@ from fingers_mjx.play.viewer.view import View
 
 HOST = "127.0.0.1"
 """Who may use this machine may look; nobody else."""
+LIFT = """**Lift of each fingertip**: running average of its vertical speed at the
+stepping frequency (colour) and phase (grey). A thick ring is paid now, most from the
+outer circle on."""
 
 
 class Page:
@@ -44,9 +48,12 @@ class Page:
         panel = server.gui.add_panel()
         with panel.add_tab("What it does"):
             self.plots = Plots(server)
+            server.gui.add_markdown(LIFT)
             self._dials = server.gui.add_html(dials(None, self.scene.colours))
         panel.dock_left()
-        panel.set_width(360)
+        panel.set_width(340)
+        server.gui.main_panel.dock_right()
+        server.gui.main_panel.set_width(340)
 
     def draw(self, view: View) -> None:
         """Draws a control step."""
@@ -73,6 +80,8 @@ def serving(port: int) -> Iterator[viser.ViserServer]:
         except OSError as error:
             found = f"{port} ({error.strerror})"
             raise InputError("--port", "", found, "a free port") from error
+    # It reports every browser that hangs up in the middle of a sentence.
+    logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
     with _quietly():
         server = viser.ViserServer(host=HOST, port=port, verbose=False)
     try:

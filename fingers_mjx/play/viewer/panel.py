@@ -66,7 +66,7 @@ class Panel:
             self._follow = gui.add_checkbox("follow the hand", True)
             self._aside = None
             if knobs.ghost is not None:
-                self._aside = gui.add_slider("log aside [m]", 0.0, 0.4, 0.01, 0.25)
+                self._aside = gui.add_slider("log aside [m]", 0.0, 0.4, 0.01, 0.15)
             gui.add_html(legend(knobs.ghost, colours))
 
     def wishes(self) -> Wishes:

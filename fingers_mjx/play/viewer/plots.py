@@ -1,5 +1,6 @@
 """Live plots of the command and of what the hand makes of it."""
 
+import numpy as np
 import viser
 from viser import uplot
 
@@ -9,7 +10,7 @@ from fingers_mjx.play.viewer.view import View
 
 PARTS = (("forward", "m/s", 0.25), ("left", "m/s", 0.25), ("turn", "rad/s", 1.5))
 """Component, unit, and the largest size that is drawn."""
-HEIGHT_PX = 140
+HEIGHT_PX = 112
 
 
 class Plots:
@@ -29,7 +30,7 @@ class Plots:
     def add(self, t_s: float, view: View) -> None:
         """Adds a control step, without drawing it."""
         both = zip(view.velocity, view.command, strict=True)
-        self._history.add(t_s, [value for pair in both for value in pair])
+        self._history.add(t_s, np.ravel(list(both)))
 
     def draw(self) -> None:
         """Draws the last seconds."""
@@ -48,6 +49,6 @@ def _plot(server: viser.ViserServer, data) -> viser.GuiUplotHandle:
         uplot.Series(label="command", stroke=hex_of(COMMAND), width=2.0, dash=(6, 4)),
     )
     axes = (uplot.Axis(size=28), uplot.Axis(size=44))
-    return server.gui.add_uplot(
-        data, series, axes=axes, legend=uplot.Legend(live=False), height=HEIGHT_PX
-    )
+    legend = uplot.Legend(live=False)
+    gui = server.gui
+    return gui.add_uplot(data, series, axes=axes, legend=legend, height=HEIGHT_PX)

@@ -15,7 +15,7 @@ NEAR = "/world/near"
 FORCE_M_PER_N = 0.015
 AXIS_M = 0.06
 TILE_M = 0.05
-GHOST_OPACITY = 0.35
+GHOST_OPACITY = 0.45
 
 
 class Scene:
@@ -31,7 +31,10 @@ class Scene:
         self, server: viser.ViserServer, model: mujoco.MjModel, with_ghost: bool
     ):
         self._server = server
-        self._world = server.scene.add_frame(WORLD, show_axes=False)
+        self._world, self._turn = (
+            server.scene.add_frame(WORLD, show_axes=False),
+            np.eye(3),
+        )
         server.scene.add_grid(
             f"{WORLD}/floor",
             cell_size=TILE_M,
@@ -52,8 +55,14 @@ class Scene:
         self._push = _ArrowSet(server, f"{NEAR}/push", PUSH)
         self.colours = finger_colours(model)
         self._springs = _SpringSet(server, f"{NEAR}/springs", self.colours)
-        server.initial_camera.position = (0.27, 0.24, 0.17)
-        server.initial_camera.look_at = (0.03, 0.0, 0.05)
+        server.initial_camera.position = (0.29, 0.27, 0.17)
+        server.initial_camera.look_at = (0.03, 0.03, 0.04)
+
+    def face(self, heading_rad: float) -> None:
+        """Turns the world so that this heading points along x of the page."""
+        half, cos, sin = heading_rad / 2, np.cos(heading_rad), np.sin(heading_rad)
+        self._world.wxyz = (np.cos(half), 0.0, 0.0, -np.sin(half))
+        self._turn = np.array([[cos, sin, 0.0], [-sin, cos, 0.0], [0.0, 0.0, 1.0]])
 
     def show(self, view: View, layers: frozenset[str], follow: bool) -> None:
         """Draws a control step.
@@ -74,7 +83,7 @@ class Scene:
         self._forces.show(contacts, middle)
         self._push.show(view.push, middle)
         self._springs.show(springs, middle)
-        self._world.position = -middle if follow else np.zeros(3)
+        self._world.position = -self._turn @ middle if follow else np.zeros(3)
 
     def show_ghost(self, poses: Poses | None, aside_w: Float[np.ndarray, "3"]) -> None:
         """Draws the measured hand.

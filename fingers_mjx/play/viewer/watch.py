@@ -7,14 +7,13 @@ import time
 import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import mujoco
 import numpy as np
 
-from envs.hand.hand_file import HandFile
+from envs.errors import InputError
 from envs.hand.spec import HAND_NQ
-from fingers_deploy import Bundle
-from fingers_deploy.policy import Runtime
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.viewer.ghost import Ghost, heading, motion_of
 from fingers_mjx.play.viewer.live import Live
@@ -38,18 +37,18 @@ class Watched:
     """What is watched.
 
     Attributes:
+        name: of the policy.
         setup: of the worlds.
-        bundle: the policy.
-        runtime: what runs it.
+        make: makes the policy's player in the worlds of a setup.
         seed: of the episodes.
         command: at the start: v_x, v_y [m/s] and yaw rate [rad/s]; half of the fastest
             forward motion of training if None.
         log: a measured log beside the simulation.
     """
 
+    name: str
     setup: Setup
-    bundle: Bundle
-    runtime: Runtime = "auto"
+    make: Callable[[Setup], Player]
     seed: int = 0
     command: tuple[float, float, float] | None = None
     log: MeasuredLog | None = None
@@ -69,15 +68,19 @@ def watch(watched: Watched, port: int, goes_on: Callable[[], bool] = lambda: Tru
     """
     setup = _without_own_commands(watched.setup)
     motion = None if watched.log is None else motion_of(watched.log)
+    knobs = knobs_for(watched)
     env = make_env(setup, 1, "cpu")
     model = env.mj_model
     with serving(port) as server:
-        title = f"{setup.train.task}, {watched.bundle.source}"
-        page = Page(server, model, _knobs(watched), title)
+        page = Page(server, model, knobs, watched.name)
         page.scene.hand.move(body_poses(_at_rest(model, env.stance.qpos)))
         page.panel.say("compiling the simulation, some seconds")
         _tell(server.get_port())
-        live = Live(_players(watched, setup), setup.hand, watched.seed)
+        live = Live(
+            lambda hand: watched.make(dataclasses.replace(setup, hand=hand)),
+            setup.hand,
+            watched.seed,
+        )
         ghost = None if motion is None else Ghost(model, motion)
         Loop(live, page, ghost).run(goes_on)
 
@@ -116,6 +119,7 @@ class Loop:
             self._note_speed(now_s)
             page.plots.add(live.time_s, view)
             if self._draw.due(now_s):
+                page.scene.face(heading(live.start_pose[3:]))
                 page.draw(view)
                 self._draw_ghost()
             if self._plot.due(now_s):
@@ -158,22 +162,26 @@ class _Every:
         return True
 
 
-def _players(watched: Watched, setup: Setup) -> Callable[[HandFile], Player]:
-    def make(hand: HandFile) -> Player:
-        env = make_env(dataclasses.replace(setup, hand=hand), 1, "cpu")
-        return Player(env, watched.bundle, watched.runtime)
+def knobs_for(watched: Watched) -> Knobs:
+    """Returns what there is to turn.
 
-    return make
-
-
-def _knobs(watched: Watched) -> Knobs:
-    ranges = _ranges(watched.setup)
-    forward = 0.0 if ranges is None else 0.5 * ranges[0][1]
+    Raises:
+        InputError: a command outside the training range, or of a task without.
+    """
+    ranges, command = _ranges(watched.setup), watched.command
+    if ranges is None and command is not None:
+        raise InputError("--command", "", list(command), "none: this task has none")
+    if command is None:
+        command = (0.0 if ranges is None else 0.5 * ranges[0][1], 0.0, 0.0)
+    for index, (low, high) in enumerate(ranges or ()):
+        if not low <= command[index] <= high:
+            valid = f"{low:g} to {high:g}"
+            raise InputError("--command", f"[{index}]", command[index], valid)
     return Knobs(
         ranges,
-        watched.command or (forward, 0.0, 0.0),
+        command,
         switches(watched.setup.hand),
-        None if watched.log is None else watched.log.source,
+        None if watched.log is None else Path(watched.log.source).name,
     )
 
 

@@ -36,6 +36,11 @@ class Wishes:
     effects: Mapping[str, float] = field(default_factory=dict)
 
     @property
+    def command_v(self) -> Float[np.ndarray, "3"] | None:
+        """The command as the environment keeps it [m/s, m/s, rad/s]."""
+        return None if self.command is None else np.array(self.command, np.float32)
+
+    @property
     def push_v(self) -> Float[np.ndarray, "3"]:
         """The force of the push in V [N]; zero without one."""
         direction = (0.0, 0.0, 0.0) if self.push is None else PUSHES[self.push]
