@@ -15,7 +15,7 @@ OKABE_ITO: tuple[Rgb, ...] = (
     (230, 159, 0),
     (86, 180, 233),
 )
-"""For fingers that look alike; the colour-blind tell them apart."""
+"""For fingers that look alike; the colour-blind see them differ."""
 FORCE: Rgb = (200, 20, 0)
 PUSH: Rgb = (140, 40, 160)
 GHOST: Rgb = (60, 130, 220)

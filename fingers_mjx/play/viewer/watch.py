@@ -75,7 +75,7 @@ def watch(watched: Watched, port: int, goes_on: Callable[[], bool] = lambda: Tru
         page = Page(server, model, knobs, watched.name)
         page.scene.hand.move(body_poses(_at_rest(model, env.stance.qpos)))
         page.panel.say("compiling the simulation, some seconds")
-        _tell(server.get_port())
+        _announce(server.get_port())
         live = Live(
             lambda hand: watched.make(dataclasses.replace(setup, hand=hand)),
             setup.hand,
@@ -208,7 +208,7 @@ def _at_rest(model: mujoco.MjModel, qpos) -> mujoco.MjData:
     return data
 
 
-def _tell(port: int) -> None:
+def _announce(port: int) -> None:
     """Says where the page is, and opens it where there is a screen."""
     url = f"http://127.0.0.1:{port}"
     print(f"viewer: {url} (Ctrl-C ends it)", flush=True)

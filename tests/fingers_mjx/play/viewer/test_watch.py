@@ -1,4 +1,4 @@
-"""The page as it is served: what a browser is told, and when it is refused."""
+"""The page as it is served: what a browser gets, and what is refused."""
 
 import dataclasses
 import socket
