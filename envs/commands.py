@@ -1,53 +1,12 @@
 """Velocity commands: sampling and resampling."""
 
-from dataclasses import dataclass, field
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.errors import InputError, check_ordered
+from envs.config.settings.commands import CommandConfig as CommandConfig
 from envs.observations import InputTerm
 from envs.streams import stream
-
-
-@dataclass(frozen=True)
-class CommandConfig:
-    """Ranges of the commands in V; the ranges are the paper's.
-
-    Attributes:
-        vel_x_mps, vel_y_mps, yaw_rate_rps: uniform ranges.
-        resample_s: time between commands; ours, the paper only says that it happens.
-        standing_fraction: share of commands that are zero; ours.
-        turning_fraction: share without planar velocity; ours.
-        straight_fraction: share without yaw rate; ours.
-    """
-
-    vel_x_mps: tuple[float, float] = field(
-        default=(0.0, 0.16), metadata={"unit": "m/s"}
-    )
-    vel_y_mps: tuple[float, float] = field(
-        default=(-0.16, 0.16), metadata={"unit": "m/s"}
-    )
-    yaw_rate_rps: tuple[float, float] = field(
-        default=(-0.45, 0.45), metadata={"unit": "rad/s"}
-    )
-    resample_s: float = field(default=5.0, metadata={"unit": "s", "low": 0.02})
-    standing_fraction: float = field(
-        default=0.05, metadata={"unit": "1", "low": 0.0, "high": 1.0}
-    )
-    turning_fraction: float = field(
-        default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
-    )
-    straight_fraction: float = field(
-        default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
-    )
-
-    def __post_init__(self) -> None:
-        check_ordered(self, "vel_x_mps", "vel_y_mps", "yaw_rate_rps")
-        if (shares := self.turning_fraction + self.straight_fraction) > 1.0:
-            what = "command.turning_fraction + command.straight_fraction"
-            raise InputError("configuration", what, f"{shares:g}", "1 at most")
 
 
 def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"]:

@@ -11,11 +11,9 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
-from envs.errors import InputError
 from envs.hand.drive.drive import Drive, DriveState, make_drive
 from envs.hand.drive.model_effects import SceneEffects, make_scene_effects
 from envs.hand.hand_file import HandFile
-from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HAND_NQ, HandSpec, hand_spec
 from envs.hand.stance import Stance
 from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
@@ -154,18 +152,6 @@ def make_plant(
         n_substeps=n_substeps,
         effects=make_scene_effects(hand, model, spec),
     )
-
-
-def check_interval(control_dt_s: float) -> None:
-    """Checks that a control interval is a whole number of physics steps.
-
-    Raises:
-        InputError: it is not, or is shorter than one.
-    """
-    substeps = control_dt_s / PHYSICS_DT_S
-    if round(substeps) < 1 or abs(substeps - round(substeps)) > 1e-6:
-        valid = f"a multiple of {PHYSICS_DT_S:g} s, the physics step"
-        raise InputError("configuration", "control_dt_s", control_dt_s, valid)
 
 
 def _output_at_rest(model: mujoco.MjModel, stance: Stance) -> PhysicsOutput:

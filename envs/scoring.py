@@ -8,10 +8,9 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
 from envs.base import State
-from envs.errors import InputError, one_of
+from envs.config.settings.rows import check_rows
 from envs.memory import PerWorldState
 from rewards import (
-    TABLES,
     Constant,
     GeometricDecay,
     RewardTable,
@@ -21,41 +20,6 @@ from rewards import (
     table_weights,
     weights_at,
 )
-
-
-def table_of(task: str, name: str) -> RewardTable:
-    """Returns the reward table of a task that has this name.
-
-    Args:
-        task: a task of `rewards.TABLES`.
-        name: of the table.
-
-    Raises:
-        InputError: the task has no table of that name.
-    """
-    tables = TABLES[task]
-    if name not in tables:
-        raise InputError("configuration", "rewards", name, one_of(tables, name))
-    return tables[name]
-
-
-def check_rows(
-    table: RewardTable,
-    values: Mapping[str, float],
-    schedule_scale: Mapping[str, float],
-) -> None:
-    """Checks that weights and factors are those of rows.
-
-    Raises:
-        InputError: there is no row of that name.
-    """
-    rows = [row.name for row in table]
-    given = {"weights": values, "schedule_scale": schedule_scale}
-    for field, names in given.items():
-        for name in names:
-            if name not in rows:
-                valid = one_of(rows, name)
-                raise InputError("configuration", f"{field}.{name}", name, valid)
 
 
 def scheduled_weights(

@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import Any, Self
 
 import jax.numpy as jnp
@@ -10,13 +9,13 @@ import mujoco
 from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
 from envs.commands import command_term
+from envs.config.settings.hand import HandSettings as HandSettings
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
-from envs.plant import Plant, check_interval
-from envs.randomize import RandomizeConfig
+from envs.plant import Plant
 from envs.signals import Signals
 from rewards import RewardTable
 
@@ -25,45 +24,6 @@ UNIT = "unit"
 
 Where a task has it, an evaluation averages over each unit first.
 """
-
-
-@dataclass(frozen=True)
-class HandSettings:
-    """Settings that every task has; a task inherits them and adds its own.
-
-    Attributes:
-        episode_s: episode length (paper).
-        control_dt_s: control interval (paper: 50 Hz).
-        action_scale_rad: α, joint-target increment at full action (paper, by task).
-        action_clip: the policy output is clipped to ± this (ours; the paper clips
-            without giving the bound).
-        curriculum_scale: factor on the steps of the reward schedules; 1 is the
-            paper's, which is made for 8,000 iterations of 24 steps.
-        schedule_scale: a further factor for the schedule of single rows, by name.
-        weights: reward weights that replace the start value of the table's.
-        randomize: domain randomization.
-        contacts_per_world, constraints_per_world: room for contacts and constraint
-            rows on the warp backend, see `make_physics`; what does not fit
-            is dropped, and reported (`envs.physics.room`).
-    """
-
-    episode_s: float = field(
-        default=20.0, metadata={"unit": "s", "low": 0.1, "high": 1e6}
-    )
-    control_dt_s: float = field(default=0.02, metadata={"unit": "s", "low": 0.005})
-    action_scale_rad: float = field(default=0.060, metadata={"unit": "rad", "low": 0.0})
-    action_clip: float = field(default=1.5, metadata={"unit": "1", "low": 0.1})
-    curriculum_scale: float = field(default=1.0, metadata={"unit": "1", "low": 1e-3})
-    schedule_scale: dict[str, float] = field(
-        default_factory=dict, metadata={"unit": "1", "low": 1e-3}
-    )
-    weights: dict[str, float] = field(default_factory=dict)
-    randomize: RandomizeConfig = field(default_factory=RandomizeConfig)
-    contacts_per_world: int = field(default=48, metadata={"low": 1, "free": True})
-    constraints_per_world: int = field(default=128, metadata={"low": 1, "free": True})
-
-    def __post_init__(self) -> None:
-        check_interval(self.control_dt_s)
 
 
 class HandTask(ABC):
@@ -241,7 +201,7 @@ class HandTask(ABC):
         """Prepares the task's fields for the next step, such as a new command: nothing.
 
         All that inputs and signals depend on changes here, and not in `magnitudes`:
-        the closed loop in C MuJoCo knows no rewards.
+        the closed loop in C MuJoCo pays no rewards.
         """
         del signals
         return memory

@@ -11,13 +11,12 @@ the hand file.
 import numpy as np
 from jaxtyping import Float
 
+from envs.config.settings.hand import PHYSICS_DT_S as PHYSICS_DT_S
 from envs.hand.effect_parts import add_effect_parts
 from envs.hand.hand_file import HandFile
 from envs.hand.model_sensors import FLOOR, PALM, PAYLOAD, V_SITE, add_sensors
 from envs.hand.nominal import FINGERS, Link
 from envs.physics.quiet_mujoco import mujoco
-
-PHYSICS_DT_S = 0.005
 
 # Contact groups as bits: what stands on the floor, and what the hand meets otherwise.
 _FLOOR_BIT, _HAND_BIT = 1, 2

@@ -3,13 +3,12 @@
 import jax
 import mujoco
 
+from envs.config.settings.backend import BACKENDS as BACKENDS
 from envs.errors import InputError, one_of
 from envs.physics.base import Physics
 from envs.physics.cpu import CpuPhysics
 from envs.physics.mjx import MjxPhysics
 from envs.physics.quiet_mjx import WARP_INSTALLED
-
-BACKENDS = ("cpu", "jax", "warp")
 
 
 def default_backend() -> str:

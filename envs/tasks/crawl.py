@@ -8,42 +8,18 @@ import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, PRNGKeyArray, Shaped
 
-from envs.commands import CommandConfig, sample_command
-from envs.errors import InputError
+from envs.commands import sample_command
+from envs.config.settings.crawl import CrawlConfig as CrawlConfig
+from envs.config.settings.rows import table_of
 from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import unrotate
-from envs.scoring import check_rows, table_of
 from envs.signals import Signals
 from envs.streams import stream
 from envs.tasks.gait import Walking
-from envs.tasks.upright import UprightSettings, near_stance
+from envs.tasks.upright import near_stance
 from rewards import RewardTable, safe_norm
-
-
-@dataclass(frozen=True)
-class CrawlConfig(UprightSettings):
-    """Settings of the crawl task; the others are those of `UprightSettings`.
-
-    Attributes:
-        rewards: name of the reward table, see `rewards.TABLES`; "footprint" is the
-            paper's, "stock" the one that the paper compares it with, "steering" the
-            first with rows for the mean velocity (ours).
-        reset_speed_mps: largest base speed at reset, each axis (ours).
-        command: ranges of the commands.
-    """
-
-    rewards: str = "footprint"
-    reset_speed_mps: float = field(default=0.05, metadata={"unit": "m/s", "low": 0.0})
-    command: CommandConfig = field(default_factory=CommandConfig)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_rows(table_of("crawl", self.rewards), self.weights, self.schedule_scale)
-        if self.command.resample_s < self.control_dt_s:
-            found, valid = self.command.resample_s, f">= {self.control_dt_s:g} s"
-            raise InputError("configuration", "command.resample_s", found, valid)
 
 
 @dataclass(frozen=True)

@@ -1,32 +1,16 @@
 """What tasks of a standing hand share: settings, first state, and when it fell."""
 
-from dataclasses import dataclass, field
-
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from envs.config.settings.hand import UprightSettings as UprightSettings
 from envs.hand.spec import HAND_NQ, JOINT_QPOS
 from envs.physics import PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply
 from envs.signals import Signals
 from envs.streams import stream
-from envs.task import HandSettings
-
-
-@dataclass(frozen=True)
-class UprightSettings(HandSettings):
-    """Settings of a task in which the hand stands; the common ones: `HandSettings`.
-
-    Attributes:
-        max_roll_deg, max_pitch_deg: tilt of V that ends the episode (paper).
-        reset_joint_rad: largest joint offset at reset (ours).
-    """
-
-    max_roll_deg: float = field(default=35.0, metadata={"unit": "deg", "low": 1.0})
-    max_pitch_deg: float = field(default=30.0, metadata={"unit": "deg", "low": 1.0})
-    reset_joint_rad: float = field(default=0.05, metadata={"unit": "rad", "low": 0.0})
 
 
 def fallen(signals: Signals, limits: UprightSettings) -> Bool[Array, ""]:

@@ -43,6 +43,9 @@ _EXTRAS = {
     "jinja2": "viz",
     "rosbags": "data",
     "pyarrow": "viz",
+    "viser": "viewer",
+    "mjviser": "viewer",
+    "trimesh": "viewer",
 }
 
 

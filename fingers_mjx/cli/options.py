@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import importlib.util
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from envs.config.settings.backend import BACKENDS
 from envs.errors import InputError, one_of
 from fingers_deploy.errors import shortened
 from fingers_deploy.files import is_folder
@@ -189,29 +191,49 @@ def _check_place(option: str, path: Path, directory: Path) -> None:
         raise InputError(option, "", found, "a place to write to") from error
 
 
+def check_backend(name: str | None) -> None:
+    """Refuses a physics backend without importing one.
+
+    Args:
+        name: that `--backend` gives, if any.
+
+    Raises:
+        InputError: there is no such backend, or it is not installed.
+    """
+    if name is None:
+        return
+    if name not in BACKENDS:
+        raise InputError("--backend", "", name, one_of(BACKENDS, name))
+    if name == "warp" and not has_warp():
+        valid = f"what is installed; for warp: {install_command()}"
+        raise InputError("--backend", "", name, valid)
+
+
+def has_warp() -> bool:
+    """Whether Warp is installed; without it, no device need be asked for."""
+    return importlib.util.find_spec("warp") is not None
+
+
 def backend_of(args: argparse.Namespace) -> str:
     """Returns the physics backend that `--backend` names, or the machine's.
 
     Raises:
         InputError: there is no such backend, or it is not installed.
     """
-    from envs.physics.backends import BACKENDS, default_backend
-    from envs.physics.quiet_mjx import WARP_INSTALLED
+    check_backend(args.backend)
+    if args.backend or not has_warp():
+        return args.backend or "cpu"
+    from envs.physics.backends import default_backend
 
-    name = args.backend or default_backend()
-    if name not in BACKENDS:
-        raise InputError("--backend", "", name, one_of(BACKENDS, name))
-    if name == "warp" and not WARP_INSTALLED:
-        valid = f"what is installed; for warp: {install_command()}"
-        raise InputError("--backend", "", name, valid)
-    return name
+    return default_backend()
 
 
-def train_config(args: argparse.Namespace, seed: int | None) -> TrainConfig:
-    """Returns the preset that `--preset` names, or the one for the backend."""
+def train_config(
+    args: argparse.Namespace, backend: str, seed: int | None
+) -> TrainConfig:
+    """Returns the preset that `--preset` names, or the one for a backend."""
     from fingers_mjx.ppo.config import preset
 
-    backend = backend_of(args)
     name = args.preset or ("fast" if backend == "warp" else "cpu")
     given: dict[str, Any] = {"backend": backend}
     if seed is not None:

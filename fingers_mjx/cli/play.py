@@ -12,7 +12,7 @@ from fingers_mjx.cli import options
 from fingers_mjx.play.sokoban import LEVELS, SOLUTIONS, Board, read_level
 
 if TYPE_CHECKING:
-    from envs.tasks.keyboard.settings import KeyboardConfig
+    from envs.config.settings.keyboard import KeyboardConfig
     from fingers_deploy import Bundle
     from fingers_mjx.play.episodes import Session
     from fingers_mjx.play.player import Player
@@ -32,8 +32,15 @@ def add(commands) -> None:
         "environment takes no part.",
         computes=False,
     )
-    what = "bundle directory or policy.onnx"
-    options.path(parser, "bundle", metavar="BUNDLE", help=what)
+    what = "bundle directory or policy.onnx; --viewer takes the committed crawl policy"
+    options.path(parser, "bundle", metavar="BUNDLE", nargs="?", help=what)
+    parser.add_argument(
+        "--viewer",
+        action="store_true",
+        help="a page in the browser, with knobs, until Ctrl-C",
+    )
+    options.value(parser, "--port", options.whole(1024, 65535), 8080, "of the page")
+    options.path(parser, "--ghost", metavar="LOG", help="a measured log on the page")
     options.path(
         parser,
         "--then",
@@ -102,6 +109,10 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("--video", "suffix", args.video.suffix, valid)
     options.check_file("--json", args.json)
     options.check_file("--video", args.video)
+    if args.viewer:
+        return _watch(args)
+    if args.bundle is None:
+        raise InputError("play", "BUNDLE", "nothing", "an exported bundle, or --viewer")
     bundle, trained = load_bundle_setup(args.bundle)
     setup = _setup(args, trained)
     player = _player(args, setup, bundle)
@@ -123,6 +134,33 @@ def run(args: argparse.Namespace) -> int:
         print("first episode:", story(played.first, player.env.dt, _then_name(args)))
     if isinstance(player, KeyPlayer):
         print("keys:", keys_story(player.results, start_board(args)))
+    return 0
+
+
+def _watch(args: argparse.Namespace) -> int:
+    """Serves the page until Ctrl-C."""
+    from fingers_mjx.demo.demo import POLICY_DIR
+    from fingers_mjx.play.viewer.watch import Watched, watch
+    from fingers_mjx.policy.source import load_bundle_setup
+    from fingers_mjx.training.compile_cache import use_compile_cache
+    from sysid.logs.read import read_log
+
+    use_compile_cache()
+    bundle, trained = load_bundle_setup(args.bundle or POLICY_DIR)
+    log = None if args.ghost is None else read_log(args.ghost)
+    command = None
+    if args.commands and args.then is None:  # the page has sliders for it
+        command, args.commands = tuple(args.commands[0]), None
+    setup, name = _setup(args, trained), (args.bundle or POLICY_DIR).name
+    watched = Watched(
+        f"{trained.train.task}: {name}",
+        setup,
+        lambda setup: _player(args, setup, bundle),
+        args.seed,
+        command,
+        log,
+    )
+    watch(watched, args.port)
     return 0
 
 

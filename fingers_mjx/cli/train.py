@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from fingers_mjx.ppo.config import TrainConfig
-    from fingers_mjx.runs.setup import Setup
+    from fingers_mjx.runs.settings import Settings
     from fingers_mjx.training.population import Member
     from fingers_mjx.training.train import Result
 
@@ -76,27 +76,29 @@ def add(commands) -> None:
 
 
 def check(args: argparse.Namespace) -> None:
-    """Refuses sizes that no machine or not this one has room for, before JAX loads.
+    """Refuses what no run can be made of, before JAX loads.
 
     Raises:
-        InputError: naming the setting, or what all of them need; or a start that is
-            neither a folder nor a regular file.
+        InputError: an unknown name or a value out of range; sizes that no machine or
+            not this one has room for; or a start that is neither a folder nor a
+            regular file.
     """
-    from envs.config.typed import override
     from fingers_deploy.files import is_folder, open_regular
-    from fingers_mjx.ppo.config import check_config, preset
     from fingers_mjx.training.memory import check_memory
 
+    _check_words(args.settings)
+    options.check_backend(args.backend)
     begin = args.warm_start
     if begin is not None and not is_folder(begin) and begin.exists():
         open_regular(begin, MAX_START_BYTES).close()
-    if args.resume is not None or args.preset == "adapt":
-        return  # sizes that have been trained with
-    rest = [x for x in args.settings if not x.startswith("env.")]
-    _check_words(rest)
-    config = override(preset(args.preset or "cpu"), rest)
-    check_config(config, "--set")
-    check_memory(config, args.seeds or 1)
+    options.check_directory("--out", args.out)
+    if args.resume is not None:
+        for path in _resumed_paths(args):
+            _resumed(args, path)
+        return
+    settings = _new(args, args.backend or "cpu")
+    if args.preset != "adapt":  # sizes that have been trained with
+        check_memory(settings.train, args.seeds or 1)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -106,8 +108,6 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.training.progress import reporter
     from fingers_mjx.training.train import train_population
 
-    _check_words(args.settings)
-    options.check_directory("--out", args.out)
     path, members = _members(args)
     setup = members[0].setup
     worlds = len(members) * setup.train.num_envs
@@ -127,17 +127,21 @@ def run(args: argparse.Namespace) -> int:
 
 def _members(args: argparse.Namespace) -> tuple[Path, list[Member]]:
     """Returns the directory of what is trained, and the learners: one, or several."""
-    from fingers_mjx.runs.setup import with_seed
+    from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
+    from fingers_mjx.runs.directory import HAND_FILE
+    from fingers_mjx.runs.setup import with_hand, with_seed
     from fingers_mjx.training.population import Member
     from fingers_mjx.training.start import Start
 
     if args.resume is not None:
-        inside = sorted((args.resume / MEMBERS).glob("*"))
-        paths = inside or [args.resume]
-        _check_resumed(args, len(inside))
         start = Start(resume=True)
-        return args.resume, [Member(_resumed(args, p), p, start) for p in paths]
-    setup = _new(args)
+        found = [(_resumed(args, p), p) for p in _resumed_paths(args)]
+        return args.resume, [
+            Member(with_hand(s, load_hand_file(p / HAND_FILE)), p, start)
+            for s, p in found
+        ]
+    settings = _new(args, options.backend_of(args))
+    setup = with_hand(settings, load_hand_file(args.hand or DEFAULT_HAND_FILE))
     path = args.out or _default_dir(setup.train)
     start = Start(False, args.warm_start, args.schedules == "keep")
     if args.seeds is None:
@@ -161,10 +165,10 @@ def _done(results: Sequence[Result], members: Sequence[Member]) -> str:
     return f"done after {most} iterations{left}; next: fingers eval {place}"
 
 
-def _new(args: argparse.Namespace) -> Setup:
+def _new(args: argparse.Namespace, backend: str) -> Settings:
     """Returns the settings of a new run."""
     from envs.registry import get_task, task_names
-    from fingers_mjx.runs.setup import new_setup, overridden
+    from fingers_mjx.runs.settings import new_settings, overridden
 
     if args.task is None:
         raise InputError("TASK", "", "", one_of(task_names()))
@@ -172,8 +176,8 @@ def _new(args: argparse.Namespace) -> Setup:
     if args.preset == "adapt" and args.warm_start is None:
         valid = "with --warm-start RUN, a first stage"
         raise InputError("--preset", "", args.preset, valid)
-    setup = new_setup(options.train_config(args, args.seed), args.hand)
-    return overridden(setup, args.settings)
+    train = options.train_config(args, backend, args.seed)
+    return overridden(new_settings(train), args.settings)
 
 
 def _check_words(assignments: list[str]) -> None:
@@ -188,22 +192,28 @@ def _check_words(assignments: list[str]) -> None:
             raise InputError("--set", name, value, f"without --set, {valid}")
 
 
-def _check_resumed(args: argparse.Namespace, members: int) -> None:
-    """Refuses options that a run to go on with has decided already."""
+def _resumed_paths(args: argparse.Namespace) -> list[Path]:
+    """Returns the runs to go on with: the members of a population, or one run.
+
+    Raises:
+        InputError: an option that a run to go on with has decided already.
+    """
     for name in _FOR_NEW_RUNS:
         if (found := getattr(args, name)) is not None:
             option = f"--{name.replace('_', '-')}"
             raise InputError(option, "", found, "only without --resume")
-    if members and args.seed is not None:
-        valid = f"nothing: {members} members have seeds of their own"
+    inside = sorted((args.resume / MEMBERS).glob("*"))
+    if inside and args.seed is not None:
+        valid = f"nothing: {len(inside)} members have seeds of their own"
         raise InputError("--seed", "", args.seed, valid)
+    return inside or [args.resume]
 
 
-def _resumed(args: argparse.Namespace, path: Path) -> Setup:
+def _resumed(args: argparse.Namespace, path: Path) -> Settings:
     """Returns the saved settings; what may be changed in them, `--set` changes."""
-    from fingers_mjx.runs.setup import overridden, run_setup
+    from fingers_mjx.runs.settings import overridden, run_settings
 
-    saved = run_setup(path)
+    saved = run_settings(path)
     for name in ("task", "preset", "backend", "seed"):
         found, was = getattr(args, name), getattr(saved.train, name)
         if found not in (None, was):

@@ -131,7 +131,8 @@ def _trained(args: argparse.Namespace) -> list[list[Path]]:
     from fingers_mjx.studies.transfer import train_on
     from fingers_mjx.training.progress import reporter
 
-    config = options.train_config(args, args.seed)
+    backend = options.backend_of(args)
+    config = options.train_config(args, backend, args.seed)
     setup = overridden(new_setup(config, args.default), args.settings)
     hands = {"default": setup.hand, "extended": load_hand_file(args.extended)}
     if hands["default"].sha256 == hands["extended"].sha256:

@@ -10,10 +10,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from envs.batch import BatchEnv
+from envs.config.settings.keyboard import KeyboardConfig
 from envs.errors import InputError
 from envs.physics.room import ROOM, too_little_room
 from envs.randomize import no_randomization
-from envs.tasks.keyboard.settings import KeyboardConfig
 from envs.tasks.keyboard.variation import nominal_keyboard
 from fingers_mjx.evaluation.evaluate import (
     Episodes,

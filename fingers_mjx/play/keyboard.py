@@ -94,6 +94,12 @@ class KeyPlayer(Player):
         self.results.append(KeysPlayed(state.outcomes, self._pressed, state.done))
         return played
 
+    def take_over(self, other: Player) -> None:
+        """Goes on with the shim and the list of another player of keys."""
+        super().take_over(other)
+        assert isinstance(other, KeyPlayer)
+        self._state, self._pressed = other._state, other._pressed
+
     def _begun(self, start: State) -> State:
         """Begins the list with an episode."""
         self._state, self._pressed = begin_keys(self.keys, 0.0), ()

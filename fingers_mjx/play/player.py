@@ -10,6 +10,7 @@ import copy
 import dataclasses
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property, partial
 from typing import Any
 
 import jax
@@ -18,6 +19,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Float
 
+from envs.actuator.effect import Params
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.hand.drive.drive import DriveState
@@ -32,6 +34,21 @@ from fingers_mjx.evaluation.record import Trace, record
 from fingers_mjx.play.inputs import PlayInputs
 
 Schedule = Float[np.ndarray, "steps 3"]
+
+
+@dataclass
+class Episode:
+    """A world in the middle of an episode; `Player.step` changes it.
+
+    Attributes:
+        model: the world's own, in C MuJoCo.
+        data: its state.
+        memory: what the environment would carry.
+    """
+
+    model: mujoco.MjModel
+    data: mujoco.MjData
+    memory: Memory
 
 
 @dataclass(frozen=True)
@@ -80,27 +97,66 @@ class Player:
             steps: control steps.
             schedule: a command for each step; drawn as in training if not given.
         """
+        episode, rows, held = self.begin(key), [], 0
+        poses = [episode.data.qpos.copy()]
+        while len(rows) < steps and not (rows and rows[-1].done):
+            command = None if schedule is None else schedule[len(rows)]
+            rows.append(self.step(episode, command))
+            poses.append(episode.data.qpos.copy())
+            held += self.controller.faults > 0
+        trace = jax.tree.map(lambda *x: np.stack(x), *rows)
+        return Played(trace, np.stack(poses), held)
+
+    def begin(self, key: Array) -> Episode:
+        """Begins an episode; the shim begins with it.
+
+        Args:
+            key: of the world, as `env.reset` takes it.
+        """
         start = self._reset(key)
         model = varied_model(self.env, start.memory.world)
         data = mujoco.MjData(model)
         data.qpos[:], data.qvel[:] = start.data.qpos, start.data.qvel
-        memory, rows, poses, held = start.memory, [], [data.qpos.copy()], 0
         self.controller.reset(np.asarray(start.memory.target))
-        self._inputs.begin(memory)
-        while len(rows) < steps and not (rows and rows[-1].done):
-            if schedule is not None:
-                command = jnp.asarray(schedule[len(rows)])
-                memory = dataclasses.replace(memory, command=command)
-            before = _state(data)
-            target = self._target(memory, before)
-            drive = self._advance(model, data, memory, target)
-            memory = dataclasses.replace(memory, drive=drive)
-            memory, row = self._judge(memory, before, _output(data), self.action)
-            rows.append(jax.device_get(row))
-            poses.append(data.qpos.copy())
-            held += self.controller.faults > 0
-        trace = jax.tree.map(lambda *x: np.stack(x), *rows)
-        return Played(trace, np.stack(poses), held)
+        self._inputs.begin(start.memory)
+        return Episode(model, data, start.memory)
+
+    def step(
+        self, episode: Episode, command: Float[np.ndarray, "3"] | None = None
+    ) -> Trace:
+        """Advances an episode by a control step; returns the step's part of the trace.
+
+        Args:
+            episode: from `begin`, not over yet.
+            command: v_x, v_y [m/s] and yaw rate [rad/s]; the environment's if None.
+        """
+        memory, data = episode.memory, episode.data
+        if command is not None:
+            memory = dataclasses.replace(memory, command=jnp.asarray(command))
+        before = _state(data)
+        target = self._target(memory, before)
+        drive = self._advance(episode.model, data, memory, target)
+        memory = dataclasses.replace(memory, drive=drive)
+        judged = self._judge(memory, before, _output(data), self.action)
+        episode.memory, row = judged
+        return jax.device_get(row)
+
+    def take_over(self, other: "Player") -> None:
+        """Goes on with the shim of another player, its history and its targets."""
+        self.controller, self._inputs = other.controller, other._inputs
+
+    def set_effects(self, params: tuple[Params, ...]) -> None:
+        """Changes the parameters of the drive's effects, without compiling anew.
+
+        Args:
+            params: of the chain of this hand, in its order.
+        """
+        self._act = partial(self._act_with, params)
+
+    @cached_property
+    def _act_with(self) -> Callable[..., Any]:
+        chain: Any = self.env.plant.drive
+        return jax.jit(lambda p, *args: dataclasses.replace(chain, params=p).act(*args))
 
     @property
     def action(self) -> Float[np.ndarray, "20"]:
@@ -158,6 +214,8 @@ class Player:
         env = self.env
         signals = env.signals(before, output, action, vars(memory))
         finite = jnp.all(jnp.isfinite(output.state.qpos))
+        # Nothing here depends on what the rewards remember; pictures show it.
+        memory, _ = env.task.magnitudes(memory, signals, finite)
         done = (env.task.terminated(signals) | ~finite).astype(jnp.float32)
         row = record(_judged_state(signals, done))
         count = memory.world.total_steps + 1

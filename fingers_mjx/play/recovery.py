@@ -45,6 +45,11 @@ class RecoveryPlayer(Player):
         judge = self._judge
         self._judge = lambda memory, *rest: judge(self._noted(memory), *rest)
 
+    def take_over(self, other: Player) -> None:
+        """Goes on with the shim of another player; see `Player.take_over`."""
+        super().take_over(other)
+        self.behaviours = self.controller
+
     def _noted(self, memory: Memory) -> Memory:
         """Enters what the shim did into what the environment keeps of the episode."""
         task, shim = memory.task, self.behaviours

@@ -9,6 +9,8 @@ checkpoints/    whole training states
 eval/           evaluations
 """
 
+from __future__ import annotations
+
 import fcntl
 import json
 import os
@@ -18,15 +20,17 @@ from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from envs.config.atomic_file import PARTIAL
 from envs.config.json_file import read_table
 from envs.config.typed import dump_yaml
 from envs.errors import InputError
-from envs.hand.hand_file import HandFile, hand_yaml
 from fingers_deploy.files import is_folder
 from fingers_mjx.runs.files import write_whole
+
+if TYPE_CHECKING:
+    from envs.hand.hand_file import HandFile
 
 FORMAT = 1
 LOCK = "run.lock"
@@ -77,6 +81,8 @@ def record_run(
     hand: HandFile | None = None,
 ) -> None:
     """Writes configuration, hand, versions and what a resumed run must share."""
+    from envs.hand.hand_file import hand_yaml
+
     text = dump_yaml(config)
     if hand is not None:
         write_whole(path / HAND_FILE, hand_yaml(hand).encode())

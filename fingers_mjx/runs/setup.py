@@ -5,36 +5,29 @@ They come from the command line or from a run directory, and go on to the enviro
 
 import dataclasses
 import hashlib
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from envs.batch import BatchEnv
 from envs.config.strict_yaml import MAX_YAML_BYTES
-from envs.config.typed import load_yaml, override
-from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
-from envs.registry import get_task, make_batch
+from envs.registry import make_batch
 from fingers_deploy.files import read_regular
-from fingers_mjx.ppo.config import TrainConfig, check_config
-from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE, saved_bound
-
-ENV_PREFIX = "env."
+from fingers_mjx.ppo.config import TrainConfig
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
+from fingers_mjx.runs.settings import ENV_PREFIX as ENV_PREFIX
+from fingers_mjx.runs.settings import Settings, load_settings, new_settings, run_task
+from fingers_mjx.runs.settings import overridden as overridden
 
 
 @dataclass(frozen=True)
-class Setup:
+class Setup(Settings):
     """Everything that a run, or an evaluation of its policy, is made from.
 
     Attributes:
-        train: settings of the run and the learner.
-        env: settings of the task, an instance of the task's configuration class.
         hand: the hand.
     """
 
-    train: TrainConfig
-    env: Any
     hand: HandFile
 
 
@@ -44,10 +37,7 @@ def run_setup(run_dir: Path) -> Setup:
     Raises:
         InputError: no run directory, one of another version, or an unknown task.
     """
-    train = saved_bound(run_dir).get("train")
-    task = train.get("task") if isinstance(train, dict) else None
-    if not isinstance(task, str):
-        raise InputError(run_dir / RUN_FILE, "bound.train.task", task, "a task")
+    task = run_task(run_dir)
     return load_setup(run_dir / CONFIG_FILE, run_dir / HAND_FILE, task)
 
 
@@ -63,35 +53,13 @@ def load_setup(config_file: Path, hand_file: Path, task: str) -> Setup:
         InputError: unknown task, or a file that is missing, malformed or of another
             version.
     """
-    config = load_yaml(_config_class(task), config_file)
-    if config.train.task != task:
-        raise InputError(config_file, "train.task", config.train.task, task)
-    check_config(config.train, config_file)
-    return Setup(config.train, config.env, load_hand_file(hand_file))
+    return with_hand(load_settings(config_file, task), load_hand_file(hand_file))
 
 
 def with_seed(setup: Setup, seed: int) -> Setup:
     """Returns the same settings for a run of another seed."""
     train = dataclasses.replace(setup.train, seed=seed)
     return dataclasses.replace(setup, train=train)
-
-
-def overridden(setup: Setup, assignments: Iterable[str]) -> Setup:
-    """Returns `setup` with the values of `--set` put in.
-
-    Args:
-        setup: settings.
-        assignments: "field=value", where a field of the task starts with "env.".
-
-    Raises:
-        InputError: naming the field, the value and what would be valid.
-    """
-    given = list(assignments)
-    task = [text for text in given if text.startswith(ENV_PREFIX)]
-    rest = [text for text in given if not text.startswith(ENV_PREFIX)]
-    return dataclasses.replace(
-        setup, train=_override_train(setup.train, rest), env=_override_env(setup, task)
-    )
 
 
 def make_env(
@@ -126,28 +94,10 @@ def config_digest(directory: Path) -> str:
 
 def new_setup(train: TrainConfig, hand_file: Path | None) -> Setup:
     """Returns the defaults of a task with a hand file, the default hand if None."""
-    env = get_task(train.task).config()
-    return Setup(train, env, load_hand_file(hand_file or DEFAULT_HAND_FILE))
+    hand = load_hand_file(hand_file or DEFAULT_HAND_FILE)
+    return with_hand(new_settings(train), hand)
 
 
-def _config_class(task: str) -> Any:
-    """Returns the class of a `config.yaml` whose run trains `task`."""
-    kind = type(get_task(task).config())
-    fields = [("train", TrainConfig), ("env", kind)]
-    return dataclasses.make_dataclass("RunConfig", fields, frozen=True)
-
-
-def _override_train(train: TrainConfig, assignments: list[str]) -> TrainConfig:
-    changed = override(train, assignments)
-    check_config(changed, "--set" if assignments else "configuration")
-    return changed
-
-
-def _override_env(setup: Setup, assignments: list[str]) -> Any:
-    bare = [text.removeprefix(ENV_PREFIX) for text in assignments]
-    try:
-        return override(setup.env, bare)
-    except InputError as error:
-        raise InputError(
-            error.source, f"{ENV_PREFIX}{error.field}", error.found, error.valid
-        ) from error
+def with_hand(settings: Settings, hand: HandFile) -> Setup:
+    """Returns what a run with these settings and this hand is made of."""
+    return Setup(settings.train, settings.env, hand)

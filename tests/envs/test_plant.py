@@ -5,10 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from envs.config.settings.hand import check_interval
 from envs.errors import InputError
 from envs.physics import PhysicsOutput
 from envs.physics.room import ROOM
-from envs.plant import check_interval
 from envs.registry import make_env
 from envs.tasks.crawl import CrawlConfig
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S
 from envs.hand.spec import HAND_NQ, TIP_LINKS
@@ -22,7 +23,6 @@ from envs.tasks.keyboard.model import (
     add_keyboard,
     free_fingertip,
 )
-from envs.tasks.keyboard.settings import KeyboardConfig
 from envs.tasks.keyboard.stance import (
     FINGER,
     FINGER_INDEX,

@@ -6,37 +6,16 @@ The first key event after a request decides it: correct if it is the requested k
 wrong if it is another. Without one in time the request fails (paper).
 """
 
-from dataclasses import dataclass, field
-
 import flax.struct
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray
 
-from envs.errors import InputError, check_ordered
+from envs.config.settings.keyboard import RequestConfig as RequestConfig
 from envs.streams import stream
 from envs.tasks.keyboard.model import ARROWS
 
 IDLE = -1
-
-
-@dataclass(frozen=True)
-class RequestConfig:
-    """When keys are asked for.
-
-    Attributes:
-        idle_s: uniform range of the gap before each request (ours; the paper's 32
-            commands took 72.5 s).
-        timeout_s: a request without a key event for so long has failed (ours).
-    """
-
-    idle_s: tuple[float, float] = field(
-        default=(0.3, 1.2), metadata={"unit": "s", "low": 0.02}
-    )
-    timeout_s: float = field(default=1.5, metadata={"unit": "s", "low": 0.1})
-
-    def __post_init__(self) -> None:
-        check_ordered(self, "idle_s")
 
 
 @flax.struct.dataclass
@@ -162,17 +141,6 @@ def next_request(
         steps=jnp.where(changed, 0, requests.steps + 1),
         gap_steps=jnp.where(ended, gap_steps, requests.gap_steps),
     )
-
-
-def check_requests(config: RequestConfig, dt_s: float) -> None:
-    """Checks the times against the control interval.
-
-    Raises:
-        InputError: a gap shorter than a control step.
-    """
-    if config.idle_s[0] < dt_s:
-        found, valid = config.idle_s[0], f">= {dt_s:g} s, a control step"
-        raise InputError("configuration", "requests.idle_s", found, valid)
 
 
 def _draw_key(key: PRNGKeyArray) -> Int[Array, ""]:

@@ -3,6 +3,7 @@
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float
 
+from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.stance import Stance
 from envs.physics import PhysicsOutput
 from envs.plant import Plant
@@ -15,7 +16,6 @@ from envs.tasks.keyboard.model import (
     KEY_NAMES,
     TOP_M,
 )
-from envs.tasks.keyboard.settings import KeyboardConfig
 from envs.tasks.keyboard.stance import PLACEMENT, SUPPORTS, TIP_RADIUS_M
 from envs.tasks.upright import fallen
 from rewards import support_drift

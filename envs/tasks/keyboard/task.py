@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
+from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.hand_file import HandFile
 from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
 from envs.hand.stance import Stance
@@ -36,7 +37,6 @@ from envs.tasks.keyboard.requests import (
     next_request,
     one_hot,
 )
-from envs.tasks.keyboard.settings import KeyboardConfig
 from envs.tasks.keyboard.signals import (
     goal_offsets,
     support_signals,

@@ -1,14 +1,12 @@
 """What differs from keyboard to keyboard, and how it lies before the hand."""
 
-from dataclasses import dataclass, field
-
 import flax.struct
 import jax
 import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.errors import check_ordered
+from envs.config.settings.keyboard import KeyboardVariation as KeyboardVariation
 from envs.physics import ModelFields
 from envs.streams import stream
 from envs.tasks.keyboard.model import (
@@ -18,33 +16,6 @@ from envs.tasks.keyboard.model import (
     KEYBOARD,
     key_spring,
 )
-
-
-@dataclass(frozen=True)
-class KeyboardVariation:
-    """Ranges of the draws.
-
-    Attributes:
-        force_scale: factor on each key's operating force (data sheet: ± 0.7 oz of 2.1).
-        actuation_m: actuation depth of each key (data sheet: 2.0 ± 0.6 mm).
-        height_m: largest error of the keys' height (ours).
-        align_m: largest error of the alignment, right and away (ours; the paper's
-            operator aligns by trial presses).
-        align_deg: largest error of the heading (ours).
-    """
-
-    force_scale: tuple[float, float] = field(
-        default=(0.67, 1.33), metadata={"unit": "1", "low": 0.1}
-    )
-    actuation_m: tuple[float, float] = field(
-        default=(0.0014, 0.0026), metadata={"unit": "m", "low": 0.001, "high": 0.0035}
-    )
-    height_m: float = field(default=0.0015, metadata={"unit": "m", "low": 0.0})
-    align_m: float = field(default=0.003, metadata={"unit": "m", "low": 0.0})
-    align_deg: float = field(default=3.0, metadata={"unit": "deg", "low": 0.0})
-
-    def __post_init__(self) -> None:
-        check_ordered(self, "force_scale", "actuation_m")
 
 
 def nominal_keyboard() -> KeyboardVariation:

@@ -5,44 +5,16 @@ frame interval old when the control step reads it, and then one to three control
 late. A lost frame leaves the one before it in place.
 """
 
-from dataclasses import dataclass, field
-
 import flax.struct
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float, Int, PRNGKeyArray
 
-from envs.errors import check_ordered
+from envs.config.settings.push import CameraConfig as CameraConfig
 from envs.streams import stream
 
 DELAY_LINE = 8
 """Samples that are kept, one per control step: the largest latency is one less."""
-
-
-@dataclass(frozen=True)
-class CameraConfig:
-    """What the camera does to positions; the values are the paper's unless noted.
-
-    Attributes:
-        rate_hz: frames per second.
-        latency_steps: least and largest latency in control steps; drawn for each
-            episode (ours).
-        dropout: share of lost frames.
-        position_noise_m: standard deviation of each coordinate (normal: ours).
-        heading_noise_rad: standard deviation of the heading that the marker on the
-            hand's back gives (ours: the paper names no noise of it).
-    """
-
-    rate_hz: float = field(default=60.0, metadata={"unit": "Hz", "low": 1.0})
-    latency_steps: tuple[int, int] = field(
-        default=(1, 3), metadata={"unit": "control steps", "low": 0, "high": 7}
-    )
-    dropout: float = field(default=0.03, metadata={"unit": "1", "low": 0.0, "high": 1})
-    position_noise_m: float = field(default=0.002, metadata={"unit": "m", "low": 0.0})
-    heading_noise_rad: float = field(default=0.02, metadata={"unit": "rad", "low": 0.0})
-
-    def __post_init__(self) -> None:
-        check_ordered(self, "latency_steps")
 
 
 @flax.struct.dataclass

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
+from envs.config.settings.push import PushConfig, Range
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
@@ -31,7 +32,6 @@ from envs.tasks.push.guide import POCKET_V, cube_v, guidance, heading
 from envs.tasks.push.load import load_signals, stopped
 from envs.tasks.push.measures import push_measures
 from envs.tasks.push.scene import CUBE, HALF_M, POS, VEL, add_cube, place_cube
-from envs.tasks.push.settings import PushConfig, Range
 from envs.tasks.push.tracking import Track, start_track, step_track, track_inputs
 from envs.tasks.upright import fallen, near_stance
 from rewards import (

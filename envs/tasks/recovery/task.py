@@ -1,25 +1,25 @@
 """Fall recovery: get up from the thumb side or the wrist side into the crawl stance."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Any
 
 import flax.struct
 import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Int, PRNGKeyArray, Shaped
 
-from envs.commands import CommandConfig, sample_command
+from envs.commands import sample_command
+from envs.config.settings.recovery import RecoveryConfig as RecoveryConfig
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import multiply, unrotate
-from envs.scoring import check_rows
 from envs.signals import Signals, tilt_from_level
 from envs.streams import stream
-from envs.task import HandSettings, HandTask
+from envs.task import HandTask
 from envs.tasks.recovery.falls import SIDES, Falls, falls_of
 from envs.tasks.recovery.measures import recovery_measures
 from envs.tasks.recovery.practice import Poses, practice_of
@@ -32,41 +32,6 @@ from envs.tasks.recovery.settle import (
 )
 from envs.tasks.upright import random_heading
 from rewards import RECOVERY, RewardTable
-
-
-def _no_command() -> CommandConfig:
-    """A hand that gets up is asked to stand (ours; the paper gives no value)."""
-    still = (0.0, 0.0)
-    return CommandConfig(still, still, still)
-
-
-@dataclass(frozen=True)
-class RecoveryConfig(HandSettings):
-    """Settings of fall recovery; the common ones are those of `HandSettings`.
-
-    Attributes:
-        command: the planar and yaw commands that the policy sees, as a crawl policy
-            does (paper); nothing is paid for following them.
-        settle: whether, as on the hand, the joint targets are taken to the stance once
-            the upright detector has fired. Evaluations do so; in training the policy
-            goes on, so that it learns to stay up (paper).
-        practice_fraction: share of training episodes that start from a practice pose
-            (`envs.tasks.recovery.practice`) instead of a fall (ours). With `settle`
-            there are none.
-        falls: which poses episodes start from; evaluations take the others (ours).
-    """
-
-    command: CommandConfig = field(default_factory=_no_command)
-    settle: bool = False
-    practice_fraction: float = field(default=0.0, metadata={"low": 0.0, "high": 1.0})
-    falls: Literal["training", "held_out"] = "training"
-    # A curled hand is near itself and the floor with many links: C MuJoCo counts up to
-    # 14 contacts under random actions, and Warp's pool also holds the near pairs.
-    contacts_per_world: int = field(default=96, metadata={"low": 1, "free": True})
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        check_rows(RECOVERY, self.weights, self.schedule_scale)
 
 
 @flax.struct.dataclass

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from envs.config.settings.keyboard import KeyboardConfig
 from envs.errors import InputError
 from envs.tasks.keyboard.measures import press_measures
 from envs.tasks.keyboard.model import KEY_NAMES
@@ -18,7 +19,6 @@ from envs.tasks.keyboard.requests import (
     next_request,
     one_hot,
 )
-from envs.tasks.keyboard.settings import KeyboardConfig
 
 DT_S, CONFIG = 0.02, RequestConfig(idle_s=(0.1, 0.2), timeout_s=0.3)
 KEYS = len(KEY_NAMES)

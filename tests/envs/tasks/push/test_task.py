@@ -6,6 +6,7 @@ import mujoco
 import numpy as np
 import pytest
 
+from envs.config.settings.push import PushConfig
 from envs.errors import InputError
 from envs.randomize import no_randomization
 from envs.registry import make_env
@@ -14,7 +15,6 @@ from envs.tasks.push.camera import CameraConfig
 from envs.tasks.push.guide import ARRIVED_M, POCKET_V, TOP_SPEED_MPS, cube_v, guide
 from envs.tasks.push.measures import push_measures
 from envs.tasks.push.scene import CUBE, POS
-from envs.tasks.push.settings import PushConfig
 
 CLEAN = CameraConfig(
     latency_steps=(0, 0), dropout=0.0, position_noise_m=0.0, heading_noise_rad=0.0

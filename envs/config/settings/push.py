@@ -1,14 +1,44 @@
 """Settings of object pushing."""
 
-from dataclasses import dataclass, field
+from __future__ import annotations
 
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from envs.config.settings.hand import UprightSettings
+from envs.config.settings.rows import check_weights
 from envs.errors import check_ordered
-from envs.scoring import check_rows
-from envs.tasks.push.camera import CameraConfig
-from envs.tasks.upright import UprightSettings
-from rewards import PUSH
+
+if TYPE_CHECKING:
+    from rewards import RewardTable
 
 Range = tuple[float, float]
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """What the camera does to positions; the values are the paper's unless noted.
+
+    Attributes:
+        rate_hz: frames per second.
+        latency_steps: least and largest latency in control steps; drawn for each
+            episode (ours).
+        dropout: share of lost frames.
+        position_noise_m: standard deviation of each coordinate (normal: ours).
+        heading_noise_rad: standard deviation of the heading that the marker on the
+            hand's back gives (ours: the paper names no noise of it).
+    """
+
+    rate_hz: float = field(default=60.0, metadata={"unit": "Hz", "low": 1.0})
+    latency_steps: tuple[int, int] = field(
+        default=(1, 3), metadata={"unit": "control steps", "low": 0, "high": 7}
+    )
+    dropout: float = field(default=0.03, metadata={"unit": "1", "low": 0.0, "high": 1})
+    position_noise_m: float = field(default=0.002, metadata={"unit": "m", "low": 0.0})
+    heading_noise_rad: float = field(default=0.02, metadata={"unit": "rad", "low": 0.0})
+
+    def __post_init__(self) -> None:
+        check_ordered(self, "latency_steps")
 
 
 @dataclass(frozen=True)
@@ -42,6 +72,12 @@ class PushConfig(UprightSettings):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        check_rows(PUSH, self.weights, self.schedule_scale)
+        check_weights(self, _table)
         check_ordered(self, "target_m", "target_bearing_deg", "object_friction")
         check_ordered(self, "object_m", "object_bearing_deg")
+
+
+def _table() -> RewardTable:
+    from rewards import PUSH
+
+    return PUSH

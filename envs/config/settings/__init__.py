@@ -1,0 +1,1 @@
+"""Settings of tasks: what can be set, known before JAX and MuJoCo are loaded."""

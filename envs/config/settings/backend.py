@@ -1,0 +1,3 @@
+"""The names of the physics backends."""
+
+BACKENDS = ("cpu", "jax", "warp")

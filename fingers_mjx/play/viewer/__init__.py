@@ -1,0 +1,1 @@
+"""The closed loop live in the browser: the hand, what acts on it, and knobs."""
