@@ -72,13 +72,13 @@ def log_likelihood_gain(worse: Model, better: Model, samples: int) -> float:
     return heldout_gain(worse, better, samples) + quieter
 
 
-def lag(rival: Model, best: Model, samples: int) -> float:
-    """How far a rival is behind another model that it does not contain.
+def likelihood_gap(candidate: Model, best: Model, samples: int) -> float:
+    """How far a candidate is behind another model that it does not contain.
 
         Δ log L = n / 2 τ log(1 + τ ΔS / (n s²)) + Δ(n log A),   s² = max(1, τ S / n)
 
     Args:
-        rival: the model that may be behind; negative if it is ahead.
+        candidate: the model that may be behind; negative if it is ahead.
         best: the model whose error S and correlation time τ count.
         samples: n, number of residuals that count.
 
@@ -86,14 +86,14 @@ def lag(rival: Model, best: Model, samples: int) -> float:
         Predictive likelihood of Gaussian errors of unknown variance (log of the ratio
         of error sums); τ, and known noise as the least variance, are ours. Gains over a
         common smaller model would differ by a per cent of themselves although two
-        rivals are alike.
+        candidates are alike.
     """
-    if rival.score < best.score:
-        return -lag(best, rival, samples)
+    if candidate.score < best.score:
+        return -likelihood_gap(best, candidate, samples)
     count = samples / best.correlation
-    share = (rival.score - best.score) / (count * best.variance(samples))
+    share = (candidate.score - best.score) / (count * best.variance(samples))
     behind = 0.5 * count * float(np.log1p(share)) if np.isfinite(share) else np.inf
-    return behind + rival.noise_cost - best.noise_cost
+    return behind + candidate.noise_cost - best.noise_cost
 
 
 def heldout_gain(worse: Model, better: Model, samples: int) -> float:

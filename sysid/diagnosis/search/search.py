@@ -12,7 +12,12 @@ from functools import cached_property
 import numpy as np
 
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.candidate import Model, fit_models, lag, log_likelihood_gain
+from sysid.diagnosis.search.candidate import (
+    Model,
+    fit_models,
+    likelihood_gap,
+    log_likelihood_gain,
+)
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.output_error import output_problem
@@ -212,12 +217,12 @@ def exchanged(
             best = without[idle[0]]
             continue
         for cause, stage in others.items():
-            gain = lag(without[cause], best, samples)
+            gain = likelihood_gap(without[cause], best, samples)
             least = max(3.0, NESTED_SHARE * gain)
             better = [
                 m
                 for m in stage
-                if lag(best, m, samples) > least
+                if likelihood_gap(best, m, samples) > least
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
             ]

@@ -5,7 +5,7 @@ from sysid.diagnosis.search.candidate import (
     Model,
     at_nominal,
     fit_models,
-    lag,
+    likelihood_gap,
     log_likelihood_gain,
 )
 from sysid.diagnosis.search.output_error import OutputProblem
@@ -104,7 +104,7 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
 def _ordered(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
     """Sorts candidates, that with the largest likelihood first."""
     least = min(stage, key=lambda m: m.score, default=smaller)
-    return sorted(stage, key=lambda m: lag(m, least, problem.samples))
+    return sorted(stage, key=lambda m: likelihood_gap(m, least, problem.samples))
 
 
 def _simplest_first(
@@ -114,10 +114,10 @@ def _simplest_first(
     if not stage:
         return stage
     samples = problem.samples
-    most, best = lag(smaller, stage[0], samples), stage[0].effects[-1]
+    most, best = likelihood_gap(smaller, stage[0], samples), stage[0].effects[-1]
 
     def tie(m: Model) -> bool:
-        behind = lag(m, stage[0], samples)
+        behind = likelihood_gap(m, stage[0], samples)
         if best not in NESTED.get(m.effects[-1], ()):
             return behind < max(3.0, MODEL_ERROR * most)
         # The model error of large friction is no sign that it falls with speed.

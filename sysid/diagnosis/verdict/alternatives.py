@@ -3,7 +3,7 @@
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.search.candidate import lag
+from sysid.diagnosis.search.candidate import likelihood_gap
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import THRESHOLD
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE
@@ -34,10 +34,10 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     """
     result = []
     without = found.without.get(cause, found.base)
-    gain = lag(without, found.best, found.samples)
+    gain = likelihood_gap(without, found.best, found.samples)
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
-        gap = lag(model, found.best, found.samples)
+        gap = likelihood_gap(model, found.best, found.samples)
         distinct = gap > max(DISTINCT, NESTED_SHARE * gain)
         distinct = distinct or effect in NESTED.get(cause, ())
         # Chance alone gives some effects as much as a nominal value's small step.

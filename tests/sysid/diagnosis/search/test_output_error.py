@@ -1,4 +1,4 @@
-"""The output error: which records it decides, its noise, and how rivals compare."""
+"""The output error: which records it decides, its noise, and how candidates compare."""
 
 from types import SimpleNamespace
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
-from sysid.diagnosis.search.candidate import fit_models, lag
+from sysid.diagnosis.search.candidate import fit_models, likelihood_gap
 from sysid.diagnosis.search.output_error import output_problem
 from sysid.diagnosis.search.whitening import Noise
 
@@ -56,27 +56,34 @@ def test_a_fit_to_the_angle_finds_a_delay_that_equations_only_guess():
     assert delay_s == pytest.approx(0.01, abs=2e-4)
 
 
-def rival(score, tau=1.0, samples=100):
+def candidate(score, tau=1.0, samples=100):
     variance = max(1.0, tau * score / samples)
     return SimpleNamespace(
         score=score, correlation=tau, noise_cost=0.0, variance=lambda _: variance
     )
 
 
-def test_rivals_that_are_alike_stay_so_however_much_both_explain():
+def test_candidates_that_are_alike_stay_so_however_much_both_explain():
     """A per cent of the error is half a sample's worth of evidence per hundred."""
-    close = lag(rival(1010.0), rival(1000.0), 100)
+    close = likelihood_gap(candidate(1010.0), candidate(1000.0), 100)
     assert close == pytest.approx(50.0 * np.log(1.01))
-    assert lag(rival(1000.0), rival(1010.0), 100) == pytest.approx(-close)
-    assert lag(rival(2000.0), rival(1000.0), 100) > 30.0
+    assert likelihood_gap(candidate(1000.0), candidate(1010.0), 100) == pytest.approx(
+        -close
+    )
+    assert likelihood_gap(candidate(2000.0), candidate(1000.0), 100) > 30.0
     # Known noise is the least variance: ratios of smaller errors say nothing.
-    assert lag(rival(20.0), rival(10.0), 100) == pytest.approx(50.0 * np.log(1.1))
-    assert lag(rival(np.inf), rival(1.0), 100) == np.inf
+    assert likelihood_gap(candidate(20.0), candidate(10.0), 100) == pytest.approx(
+        50.0 * np.log(1.1)
+    )
+    assert likelihood_gap(candidate(np.inf), candidate(1.0), 100) == np.inf
 
 
 def test_correlated_errors_count_less():
-    once = lag(rival(2000.0), rival(1000.0), 100)
-    assert lag(rival(2000.0, 10.0), rival(1000.0, 10.0), 100) < 0.2 * once
+    once = likelihood_gap(candidate(2000.0), candidate(1000.0), 100)
+    assert (
+        likelihood_gap(candidate(2000.0, 10.0), candidate(1000.0, 10.0), 100)
+        < 0.2 * once
+    )
 
 
 def test_noise_is_white_without_repeats():
