@@ -83,6 +83,10 @@ def add(commands) -> None:
     )
     options.value(parser, "--fps", options.number(1.0), 25.0, "frames per second")
     options.value(parser, "--width", options.whole(64, 4096), 640, "of the video")
+    what = "auto: MuJoCo's renderer where a GPU draws, else ray casting (default auto)"
+    parser.add_argument(
+        "--renderer", choices=("auto", "mujoco", "raycast"), default="auto", help=what
+    )
     options.path(parser, "--json", help="summary to write")
 
 
@@ -252,7 +256,7 @@ def _film(
 
     args.video.parent.mkdir(parents=True, exist_ok=True)
     with counting(sys.stderr, "drawing", "frames") as progress:
-        film = Film(args.video, args.fps, args.width, progress)
+        film = Film(args.video, args.fps, args.width, progress, args.renderer)
         if bundle.manifest.task == "keyboard":
             write_keyboard_video(film, player.env, played.first, start_board(args))
         else:
