@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError
 from fingers_mjx.cli import options
+from fingers_mjx.cli.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from fingers_mjx.runs.setup import Setup
@@ -25,6 +26,8 @@ def add(commands) -> None:
         "for a run directory, writes summary, table of episodes and figures to "
         "RUN/eval unless --out says otherwise.",
     )
+    parser.set_defaults(check=options.check_policy)
+    options.offer_settings(parser, options.policy_settings, _preview)
     options.path(parser, "policy", metavar="POLICY", help=options.POLICY_HELP)
     options.episodes(parser, 256)
     options.seed(parser)
@@ -49,13 +52,13 @@ def run(args: argparse.Namespace) -> int:
     """Evaluates; the table goes to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary, print_measures
     from fingers_mjx.evaluation import source as evaluation
-    from fingers_mjx.policy.source import is_run, load_source
+    from fingers_mjx.policy.place import is_run
+    from fingers_mjx.policy.source import load_source
     from fingers_mjx.training.counting import counting
 
     backend = options.backend_of(args)
     if len(args.commands or ()) > 1:
         raise InputError("--command", "", f"{len(args.commands)} commands", "one")
-    evaluation.check_policy_settings(args.settings)
     options.check_file("--json", args.json)
     options.check_directory("--out", args.out)
     loaded = load_source(args.policy)
@@ -72,6 +75,15 @@ def run(args: argparse.Namespace) -> int:
     keep_summary(args.json, summary)
     print_measures(summary)
     return 0
+
+
+def _preview(args: argparse.Namespace) -> str:
+    """Returns what would be simulated, as a `config.yaml`."""
+    prepare_jax()
+    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.runs.settings import settings_yaml
+
+    return settings_yaml(_setup(args, load_source(args.policy).setup))
 
 
 def _setup(args: argparse.Namespace, setup: Setup) -> Setup:

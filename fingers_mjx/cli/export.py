@@ -25,7 +25,7 @@ def add(commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Exports and prints how far the runtimes are from JAX."""
     from fingers_mjx.export.run import export_run
-    from fingers_mjx.policy.source import check_run
+    from fingers_mjx.policy.place import check_run
 
     check_run(args.run_dir)
     out = args.out or args.run_dir

@@ -38,11 +38,23 @@ def check_installation(root: Path = ROOT) -> None:
         raise UnsupportedInstallation(
             "packaging: found nothing; valid: any version (pip install packaging)"
         )
-    table = source_tree(root)
-    python, requirements = _installed() if table is None else _asked_by(table, root)
+    python, texts = requirements(root)
     check_python(platform.python_version(), python)
-    for text in requirements:
+    for text in texts:
         check_requirement(text)
+
+
+def requirements(root: Path = ROOT) -> tuple[str, list[str]]:
+    """Returns the Python versions and the packages that we ask for.
+
+    Args:
+        root: directory from which `fingers_mjx` was imported.
+
+    Raises:
+        UnsupportedInstallation: nothing says so, or a package beside ours is missing.
+    """
+    table = source_tree(root)
+    return _installed() if table is None else _asked_by(table, root)
 
 
 def source_tree(root: Path = ROOT) -> dict[str, Any] | None:

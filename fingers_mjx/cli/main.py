@@ -9,17 +9,19 @@ import argparse
 import importlib
 import os
 import sys
-import warnings
 from collections.abc import Sequence
 
 from fingers_deploy.errors import shortened
+from fingers_mjx.cli import doctor
 from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
 from fingers_mjx.cli.installation import (
     UnsupportedInstallation,
     check_installation,
     check_places,
 )
-from fingers_robot.cli.parser import Parser, UsageError, refuse_empty
+from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.parser import CommandParser
+from fingers_robot.cli.parser import UsageError, refuse_empty
 
 COMMANDS = (
     "train",
@@ -30,6 +32,8 @@ COMMANDS = (
     "export",
     "play",
     "hand",
+    "tasks",
+    "doctor",
 )
 SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
@@ -51,13 +55,14 @@ _EXTRAS = {
 
 def make_parser() -> argparse.ArgumentParser:
     """Returns the parser of all commands; each names its function in `args.run`."""
-    parser = Parser(
+    parser = CommandParser(
         prog="fingers",
         description="Teach an anthropomorphic hand to walk on its fingertips.",
         epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 5 members "
         "of a sweep missing, 6 an installation that cannot work, 75 stopped by a "
         "signal after saving (go on with --resume).",
     )
+    _add(parser, "completion")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
         _add(commands, name)
@@ -70,9 +75,9 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def _add(commands, name: str) -> None:
+def _add(place, name: str) -> None:
     """Imports a command, which imports what is heavy when it runs, and adds it."""
-    importlib.import_module(f"fingers_mjx.cli.{name}").add(commands)
+    importlib.import_module(f"fingers_mjx.cli.{name}").add(place)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -82,14 +87,20 @@ def main(argv: Sequence[str] | None = None) -> int:
         argv: arguments after the program's name; those of the process if not given.
     """
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
+    words = sys.argv[1:] if argv is None else list(argv)
     try:
+        if words == ["doctor"]:  # it says what is wrong where nothing else can run
+            return doctor.run()
         check_places()
-        args = make_parser().parse_args(argv)
+        args = make_parser().parse_args(words)
         refuse_empty(args)
         args.check(args)
         check_installation()
         _note_idle_gpu(args)
-        _prepare_jax()
+        if args.dry_run:
+            print(args.preview(args), end="")
+            return 0
+        prepare_jax()
         return args.run(args)
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)
@@ -98,16 +109,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         if status is None:
             raise
         return _say(_sentence(error), status)
-
-
-def _prepare_jax() -> None:
-    """Sets what must be set before JAX computes anything, and imports it quietly."""
-    from envs.rounding import fix_rounding
-
-    fix_rounding()
-    # JAX warns of every child process; ours (git, ffmpeg) are replaced at once.
-    warnings.filterwarnings("ignore", "os.fork", RuntimeWarning)
-    importlib.import_module("envs.physics.quiet_mjx")
 
 
 def _note_idle_gpu(args: argparse.Namespace) -> None:

@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import importlib.util
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,8 @@ from fingers_mjx.cli.gpu import install_command
 from fingers_robot.cli.parser import plain_number, plain_whole
 
 if TYPE_CHECKING:
+    from envs.config.documented import Setting
+    from fingers_mjx.cli.parser import CommandParser
     from fingers_mjx.ppo.config import TrainConfig
 
 MAX_SEED = 2**32 - 1
@@ -33,7 +35,7 @@ def command(
     summary: str,
     details: str,
     computes: bool = True,
-) -> argparse.ArgumentParser:
+) -> CommandParser:
     """Adds a command and returns its parser; `run` is called with its arguments.
 
     Args:
@@ -47,8 +49,28 @@ def command(
     parser = commands.add_parser(
         name, help=summary, description=details, allow_abbrev=False
     )
-    parser.set_defaults(run=run, computes=computes, check=lambda args: None)
+    parser.set_defaults(
+        run=run, computes=computes, check=lambda args: None, dry_run=False
+    )
     return parser
+
+
+def offer_settings(
+    parser: CommandParser,
+    offered: Callable[[argparse.Namespace], Iterable[Setting]],
+    preview: Callable[[argparse.Namespace], str],
+) -> None:
+    """Lets a command take settings as flags, and show what would be done with them.
+
+    Args:
+        parser: of the command, which has `--set` too.
+        offered: returns, for the other arguments, the settings that may be given.
+        preview: returns the resolved configuration as YAML.
+    """
+    parser.offered = offered
+    parser.set_defaults(preview=preview)
+    what = "print the resolved configuration as YAML and do nothing"
+    parser.add_argument("--dry-run", action="store_true", help=what)
 
 
 def whole(low: int, high: int = MOST) -> Callable[[str], int]:
@@ -133,6 +155,29 @@ def episodes(parser, default: int) -> None:
     parser.add_argument(
         "--episodes", type=whole(1), default=default, help=f"default {default}"
     )
+
+
+def policy_settings(args: argparse.Namespace) -> list[Setting]:
+    """Returns the settings of the task of a policy, in `args.policy`."""
+    from envs.config.documented import settings_of
+    from fingers_mjx.policy.place import saved_settings
+    from fingers_mjx.runs.settings import ENV_PREFIX
+
+    if args.policy is None:
+        return []
+    return list(settings_of(saved_settings(args.policy).env, ENV_PREFIX))
+
+
+def check_policy(args: argparse.Namespace) -> None:
+    """Refuses what a policy cannot be measured with, before JAX loads.
+
+    Raises:
+        InputError: no policy, an unknown setting or backend.
+    """
+    from fingers_mjx.policy.place import check_policy
+
+    check_backend(getattr(args, "backend", None))
+    check_policy(args.policy, args.settings)
 
 
 def fixed_command(parser, what: str) -> None:

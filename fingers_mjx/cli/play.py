@@ -5,19 +5,24 @@ from __future__ import annotations
 import argparse
 import dataclasses
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
 from fingers_mjx.cli import options
-from fingers_mjx.play.sokoban import LEVELS, SOLUTIONS, Board, read_level
+from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
+from fingers_mjx.play.sokoban import LEVELS
 
 if TYPE_CHECKING:
-    from envs.config.settings.keyboard import KeyboardConfig
     from fingers_deploy import Bundle
     from fingers_mjx.play.episodes import Session
     from fingers_mjx.play.player import Player
     from fingers_mjx.runs.setup import Setup
-    from fingers_robot.behaviour.keyboard.keys import KeyTimes
+
+
+CRAWL_POLICY = Path(__file__).parents[1] / "policies" / "crawl"
+"""The committed policy that crawls."""
 
 
 def add(commands) -> None:
@@ -32,8 +37,11 @@ def add(commands) -> None:
         "environment takes no part.",
         computes=False,
     )
-    what = "bundle directory or policy.onnx; --viewer takes the committed crawl policy"
-    options.path(parser, "bundle", metavar="BUNDLE", nargs="?", help=what)
+    parser.set_defaults(check=_check)
+    options.offer_settings(parser, options.policy_settings, _preview)
+    what = f"{options.POLICY_HELP}; --viewer takes the committed crawl policy"
+    options.path(parser, "policy", metavar="POLICY", nargs="?", help=what)
+    options.settings(parser, "a setting of the task such as env.episode_s=10")
     parser.add_argument(
         "--viewer",
         action="store_true",
@@ -75,6 +83,10 @@ def add(commands) -> None:
     )
     options.value(parser, "--fps", options.number(1.0), 25.0, "frames per second")
     options.value(parser, "--width", options.whole(64, 4096), 640, "of the video")
+    what = "auto: MuJoCo's renderer where a GPU draws, else ray casting (default auto)"
+    parser.add_argument(
+        "--renderer", choices=("auto", "mujoco", "raycast"), default="auto", help=what
+    )
     options.path(parser, "--json", help="summary to write")
 
 
@@ -93,8 +105,34 @@ def _add_keys(parser) -> None:
     options.value(parser, "--retries", options.whole(0, 10), 0, what)
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be played, before JAX loads."""
+    if args.policy is None and not args.viewer:
+        valid = "a run or an exported bundle, or --viewer"
+        raise InputError("play", "POLICY", "nothing", valid)
+    args.policy = args.policy or CRAWL_POLICY
+    options.check_policy(args)
+
+
 def run(args: argparse.Namespace) -> int:
-    """Plays; the table goes to stdout, progress to stderr."""
+    """Plays; a run that was not exported is, for as long as it takes."""
+    from fingers_mjx.export.run import as_bundle
+
+    with as_bundle(args.policy) as args.policy, as_bundle(args.then) as args.then:
+        return _play(args)
+
+
+def _preview(args: argparse.Namespace) -> str:
+    """Returns the settings of the worlds to play in, as a `config.yaml`."""
+    prepare_jax()
+    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.runs.settings import settings_yaml
+
+    return settings_yaml(_setup(args, load_source(args.policy).setup))
+
+
+def _play(args: argparse.Namespace) -> int:
+    """Plays a bundle; the table goes to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary, print_measures
     from fingers_mjx.evaluation.source import document
     from fingers_mjx.play.episodes import play_episodes, schedule_of
@@ -111,9 +149,7 @@ def run(args: argparse.Namespace) -> int:
     options.check_file("--video", args.video)
     if args.viewer:
         return _watch(args)
-    if args.bundle is None:
-        raise InputError("play", "BUNDLE", "nothing", "an exported bundle, or --viewer")
-    bundle, trained = load_bundle_setup(args.bundle)
+    bundle, trained = load_bundle_setup(args.policy)
     setup = _setup(args, trained)
     player = _player(args, setup, bundle)
     steps = max(1, round(args.seconds / player.env.dt))
@@ -124,7 +160,7 @@ def run(args: argparse.Namespace) -> int:
             player, args.episodes, steps, args.seed, schedule, progress
         )
     trained_steps = bundle.manifest.provenance.normalizer.steps
-    source = PolicySource(args.bundle, setup, bundle.network, trained_steps)
+    source = PolicySource(args.policy, setup, bundle.network, trained_steps)
     summary = document(source, played.table, args.seed, _conditions(args, played))
     keep_summary(args.json, summary)
     if args.video:
@@ -139,19 +175,18 @@ def run(args: argparse.Namespace) -> int:
 
 def _watch(args: argparse.Namespace) -> int:
     """Serves the page until Ctrl-C."""
-    from fingers_mjx.demo.demo import POLICY_DIR
     from fingers_mjx.play.viewer.watch import Watched, watch
     from fingers_mjx.policy.source import load_bundle_setup
     from fingers_mjx.training.compile_cache import use_compile_cache
     from sysid.logs.read import read_log
 
     use_compile_cache()
-    bundle, trained = load_bundle_setup(args.bundle or POLICY_DIR)
+    bundle, trained = load_bundle_setup(args.policy)
     log = None if args.ghost is None else read_log(args.ghost)
     command = None
     if args.commands and args.then is None:  # the page has sliders for it
         command, args.commands = tuple(args.commands[0]), None
-    setup, name = _setup(args, trained), (args.bundle or POLICY_DIR).name
+    setup, name = _setup(args, trained), args.policy.name
     watched = Watched(
         f"{trained.train.task}: {name}",
         setup,
@@ -162,43 +197,6 @@ def _watch(args: argparse.Namespace) -> int:
     )
     watch(watched, args.port)
     return 0
-
-
-def keys_asked(args: argparse.Namespace, bundle: Bundle) -> tuple[str, ...] | None:
-    """Returns the keys that the options ask for; None if they ask for none.
-
-    Raises:
-        InputError: for a policy of another task, both options, or an unknown key.
-    """
-    from fingers_robot.behaviour.keyboard.keys import ARROWS
-
-    if args.keys is None and args.level is None:
-        return None
-    option = "--keys" if args.level is None else "--level"
-    if bundle.manifest.task != "keyboard":
-        raise InputError(option, "", bundle.manifest.task, "a keyboard policy")
-    if args.keys is not None and args.level is not None:
-        raise InputError("--keys", "", args.keys, "either --keys or --level")
-    if args.level:
-        return SOLUTIONS[LEVELS[args.level]]
-    names = tuple(name.strip() for name in str(args.keys).split(","))
-    for name in names:
-        if name not in ARROWS:
-            raise InputError("--keys", "", name or "nothing", one_of(ARROWS, name))
-    return names
-
-
-def start_board(args: argparse.Namespace) -> Board | None:
-    """Returns the board that the keys move, if a level is played."""
-    return None if args.level is None else read_level(LEVELS[args.level])
-
-
-def key_times(args: argparse.Namespace, config: KeyboardConfig) -> KeyTimes:
-    """Returns gap and time-out: the mean gap and the time-out of training."""
-    from fingers_robot.behaviour.keyboard.keys import KeyTimes
-
-    requests = config.requests
-    return KeyTimes(sum(requests.idle_s) / 2, requests.timeout_s, args.retries)
 
 
 def _player(args: argparse.Namespace, setup: Setup, bundle: Bundle) -> Player:
@@ -234,8 +232,10 @@ def _then_name(args: argparse.Namespace) -> str | None:
 def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     """Returns the worlds to play in."""
     from fingers_mjx.evaluation.source import nominal, with_command, without_practice
+    from fingers_mjx.runs.settings import overridden
 
-    setup = without_practice(trained if args.randomize else nominal(trained))
+    setup = overridden(trained if args.randomize else nominal(trained), args.settings)
+    setup = without_practice(setup)
     if args.commands and len(args.commands) == 1 and args.then is None:
         setup = with_command(setup, args.commands[0])
     if args.friction is None:
@@ -256,7 +256,7 @@ def _film(
 
     args.video.parent.mkdir(parents=True, exist_ok=True)
     with counting(sys.stderr, "drawing", "frames") as progress:
-        film = Film(args.video, args.fps, args.width, progress)
+        film = Film(args.video, args.fps, args.width, progress, args.renderer)
         if bundle.manifest.task == "keyboard":
             write_keyboard_video(film, player.env, played.first, start_board(args))
         else:
@@ -271,5 +271,6 @@ def _conditions(args: argparse.Namespace, played: Session) -> dict[str, Any]:
         "runtime": args.runtime,
         "then": _then_name(args),
         **{name: getattr(args, name) for name in names},
+        "settings": args.settings,
         "steps_held": played.held,
     }

@@ -22,6 +22,7 @@ def add(commands) -> None:
         "and at rest; then how the robot's heading controller holds and changes its "
         "heading while it walks.",
     )
+    parser.set_defaults(check=options.check_policy)
     options.path(parser, "policy", metavar="POLICY", help=options.POLICY_HELP)
     options.episodes(parser, 32)
     options.seed(parser)
@@ -41,7 +42,7 @@ def add(commands) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measures; the tables go to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary
-    from fingers_mjx.evaluation.source import check_policy_settings, nominal
+    from fingers_mjx.evaluation.source import nominal
     from fingers_mjx.evaluation.steering.commands import obeyed
     from fingers_mjx.evaluation.steering.heading_hold import held
     from fingers_mjx.evaluation.steering.worlds import Course
@@ -51,7 +52,6 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.training.counting import counting
     from fingers_robot.behaviour.heading import HeadingConfig
 
-    check_policy_settings(args.settings)
     options.check_file("--json", args.json)
     course = Course(args.episodes, args.seed, options.backend_of(args), args.seconds)
     source = load_source(args.policy)

@@ -7,14 +7,24 @@ import json
 import sys
 import time
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from envs.errors import InputError
 from fingers_mjx.cli import options
+
+if TYPE_CHECKING:
+    from envs.config.documented import Setting
+    from fingers_mjx.studies.sweep.spec import Sweep
 
 STATUS = "status"
 MISSING = 5
 """Exit status of a sweep that is over and lacks members."""
 REFRESH_S = 2.0
+_TABLES = (
+    *("set", "configurations", "search", "grid", "stages", "promote"),
+    "evaluate.set",
+)
+"""Fields of a specification that hold tables, for which a flag has no room."""
 
 
 def add(commands) -> None:
@@ -28,10 +38,37 @@ def add(commands) -> None:
         "same command goes on after it was stopped or killed. `fingers sweep status "
         "DIR` shows how the members of a sweep stand.",
     )
+    parser.set_defaults(settings=[])
+    options.offer_settings(parser, _offered, _preview)
     what = "specification of the sweep; or the word status, and DIR after it"
     options.path(parser, "spec", metavar="SPEC.yaml", help=what)
     options.path(parser, "directory", metavar="DIR", nargs="?", help="with status only")
     options.path(parser, "-o", "--out", metavar="DIR", help="directory of the sweep")
+
+
+def _offered(args: argparse.Namespace) -> list[Setting]:
+    """Returns the fields of a specification that hold one value or a list."""
+    from envs.config.documented import settings_of
+
+    if str(args.spec) == STATUS:
+        return []
+    fields = settings_of(_written(args.spec, []))
+    return [field for field in fields if field.name not in _TABLES]
+
+
+def _preview(args: argparse.Namespace) -> str:
+    """Returns the specification with the flags put in."""
+    from envs.config.typed import dump_yaml
+
+    return dump_yaml(_written(args.spec, args.settings))
+
+
+def _written(source: Path, assignments: list[str]) -> Sweep:
+    """Returns the specification in a file, changed as asked."""
+    from envs.config.typed import load_yaml, override
+    from fingers_mjx.studies.sweep.spec import Sweep
+
+    return override(load_yaml(Sweep, source), assignments, "arguments")
 
 
 def run(args: argparse.Namespace) -> int:
@@ -45,26 +82,24 @@ def run(args: argparse.Namespace) -> int:
         raise InputError("fingers sweep", "DIR", args.directory, valid)
     if args.out is None:
         raise InputError("fingers sweep", "-o", "", "the directory of the sweep")
-    return _run(args.spec, args.out)
+    return _run(args.spec, args.settings, args.out)
 
 
-def _run(source: Path, out: Path) -> int:
+def _run(source: Path, assignments: list[str], out: Path) -> int:
     """Runs a sweep; the report goes to stdout."""
     import jax
 
-    from envs.config.typed import load_yaml
     from fingers_mjx.studies.sweep.book import Book
     from fingers_mjx.studies.sweep.display import display
     from fingers_mjx.studies.sweep.engines.by_name import make_engine
     from fingers_mjx.studies.sweep.report import report
     from fingers_mjx.studies.sweep.resolve import keep_sweep
     from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
-    from fingers_mjx.studies.sweep.spec import Sweep
 
     # This process trains nothing; the memory of a GPU is for those that do.
     jax.config.update("jax_platforms", "cpu")
     options.check_directory("-o", out)
-    written, root = load_yaml(Sweep, source), out.absolute()
+    written, root = _written(source, assignments), out.absolute()
     with sweep_lock(root):
         spec = keep_sweep(written, source, root)
         with display(sys.stdout, root) as show:

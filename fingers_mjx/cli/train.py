@@ -10,16 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
 from fingers_mjx.cli import options
+from fingers_mjx.cli.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from envs.config.documented import Setting
     from fingers_mjx.ppo.config import TrainConfig
     from fingers_mjx.runs.settings import Settings
     from fingers_mjx.training.population import Member
     from fingers_mjx.training.train import Result
 
 _FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules", "seeds")
+
+_WORDS = ("task", "preset", "seed", "backend")
+"""Settings for which the command line has words of its own."""
 
 MAX_START_BYTES = 64 << 20
 MEMBERS, MOST_SEEDS = "members", 100
@@ -37,6 +42,7 @@ def add(commands) -> None:
         "SIGINT saves and stops; --resume goes on.",
     )
     parser.set_defaults(check=check)
+    options.offer_settings(parser, _offered, _preview)
     parser.add_argument("task", metavar="TASK", nargs="?", help="such as crawl")
     parser.add_argument(
         "--preset",
@@ -99,6 +105,36 @@ def check(args: argparse.Namespace) -> None:
     settings = _new(args, args.backend or "cpu")
     if args.preset != "adapt":  # sizes that have been trained with
         check_memory(settings.train, args.seeds or 1)
+
+
+def _offered(args: argparse.Namespace) -> list[Setting]:
+    """Returns the settings of a run: of its learner alone while there is no task."""
+    from envs.config.documented import settings_of
+    from fingers_mjx.ppo.config import preset
+    from fingers_mjx.runs.settings import ENV_PREFIX, run_settings
+
+    if args.task is None and args.resume is None:
+        train, env = preset(args.preset or "cpu"), None
+    else:
+        settings = (
+            run_settings(_resumed_paths(args)[0])
+            if args.resume is not None
+            else _new(args, args.backend or "cpu")
+        )
+        train, env = settings.train, settings.env
+    learner = [s for s in settings_of(train) if s.name not in _WORDS]
+    return learner if env is None else [*learner, *settings_of(env, ENV_PREFIX)]
+
+
+def _preview(args: argparse.Namespace) -> str:
+    """Returns the `config.yaml` of the run; of several, that of the first."""
+    from fingers_mjx.runs.settings import settings_yaml
+
+    if args.resume is not None:
+        return settings_yaml(_resumed(args, _resumed_paths(args)[0]))
+    if args.backend is None and options.has_warp():
+        prepare_jax()
+    return settings_yaml(_new(args, options.backend_of(args)))
 
 
 def run(args: argparse.Namespace) -> int:

@@ -233,15 +233,3 @@ def typical_episode(table: EpisodeTable) -> int:
     if not len(known):
         return int(longest[0])
     return int(known[np.argsort(speed[known], kind="stable")[len(known) // 2]])
-
-
-def check_policy_settings(assignments: Sequence[str]) -> None:
-    """Refuses settings of the learner, which an evaluation has no use for.
-
-    Raises:
-        InputError: naming the first one.
-    """
-    for text in assignments:
-        if not text.startswith("env."):
-            valid = "a setting of the task, env.FIELD=VALUE"
-            raise InputError("--set", "", text, valid)

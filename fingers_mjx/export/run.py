@@ -1,11 +1,15 @@
 """From a run directory to a bundle that can be evaluated and played anywhere."""
 
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from envs.batch import BatchEnv
 from envs.config.atomic_file import write_atomic
 from envs.config.json_file import read_table
 from envs.errors import InputError
+from fingers_deploy.bundle import POLICY_FILE
 from fingers_deploy.manifest import Normalizer, Provenance
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.export.export import (
@@ -18,6 +22,7 @@ from fingers_mjx.export.export import (
 from fingers_mjx.export.onnx_graph import PolicyWeights
 from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import check_run_interface, interface_of
+from fingers_mjx.policy.place import is_run
 from fingers_mjx.ppo.state import make_learner, train_template
 from fingers_mjx.runs.checkpoint import Saved
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, VERSIONS_FILE
@@ -27,6 +32,25 @@ from fingers_mjx.runs.setup import (
     make_env,
     run_setup,
 )
+
+
+@contextmanager
+def as_bundle(path: Path | None) -> Iterator[Path | None]:
+    """Yields a bundle: `path`, or what a run without one exports, until it is done.
+
+    Args:
+        path: of a bundle, or a run; a run into which one was exported is that one.
+
+    Raises:
+        InputError: as `export_run`.
+    """
+    if path is None or not is_run(path) or (path / POLICY_FILE).is_file():
+        yield path
+        return
+    with tempfile.TemporaryDirectory(prefix="fingers-") as folder:
+        out = Path(folder) / path.absolute().name
+        export_run(path, out)
+        yield out
 
 
 def export_run(run_dir: Path, out_dir: Path) -> ExportReport:

@@ -17,8 +17,7 @@ from scipy.ndimage import gaussian_filter1d
 from envs.config.atomic_file import atomic_path, write_atomic
 from envs.errors import InputError
 from fingers_mjx.pictures.camera import Camera
-from fingers_mjx.pictures.raycast import render
-from fingers_mjx.pictures.shade import Look
+from fingers_mjx.pictures.renderer import renderer
 
 Frame = UInt8[np.ndarray, "h w 3"]
 README_BYTES = 2_000_000
@@ -61,8 +60,7 @@ def frames(
     qpos: Float[np.ndarray, "frames nq"],
     cameras: Sequence[Camera],
     size: tuple[int, int] = (640, 480),
-    look: Look | None = None,
-    samples: int = 2,
+    drawn_by: str = "auto",
 ) -> Iterator[Frame]:
     """Draws one picture per recorded pose.
 
@@ -71,14 +69,17 @@ def frames(
         qpos: a recorded pose for each frame.
         cameras: a point of view for each frame.
         size: width and height in pixels.
-        look: light and colours.
-        samples: anti-aliasing, see `raycast.render`.
+        drawn_by: out of `renderer.RENDERERS`.
+
+    Raises:
+        InputError: such a renderer does not work here.
     """
     data = mujoco.MjData(model)
-    for pose, camera in zip(qpos, cameras, strict=True):
-        data.qpos[:] = pose
-        mujoco.mj_kinematics(model, data)
-        yield render(model, data, camera, size, look, samples)
+    with renderer(drawn_by, model, size) as draw:
+        for pose, camera in zip(qpos, cameras, strict=True):
+            data.qpos[:] = pose
+            mujoco.mj_kinematics(model, data)
+            yield draw(data, camera)
 
 
 def write_mp4(path: Path, pictures: Iterable[Frame], fps: float, crf: int = 20) -> Path:

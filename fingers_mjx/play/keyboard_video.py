@@ -38,7 +38,7 @@ def write_keyboard_video(
     steps = frame_steps(len(played.qpos), env.dt, film.fps)
     beside = 2 * round(film.width * PANEL / 2)
     size, views = (film.width - beside, film.height), [VIEW] * len(steps)
-    pictures = frames(env.mj_model, played.qpos[steps], views, size)
+    pictures = frames(env.mj_model, played.qpos[steps], views, size, film.drawn_by)
     boards = None if start is None else [start, *boards_of(played.trace, start)]
 
     def with_panel(step: int, picture: Frame) -> Frame:

@@ -35,17 +35,24 @@ class Film:
         fps: frames per second.
         width: of the picture; its height is 9/16 of that.
         progress: called with (frames drawn, frames in all).
+        drawn_by: out of `fingers_mjx.pictures.renderer.RENDERERS`.
     """
 
     path: Path
     fps: float
     width: int
     progress: Callable[[int, int], None]
+    drawn_by: str = "auto"
 
     @property
     def height(self) -> int:
         """Rows of the picture, an even number."""
         return 2 * round(self.width * ASPECT / 2)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        return self.width, self.height
 
     def write(self, pictures: Iterator[Frame], count: int) -> Path:
         """Writes `count` pictures and reports the progress."""
@@ -69,7 +76,7 @@ def write_video(film: Film, env: BatchEnv, played: Played) -> Path:
     steps = frame_steps(len(played.qpos), env.dt, film.fps)
     qpos, target_w = played.qpos[steps], _target(played)
     cameras = follow(_view(qpos[0], target_w), qpos[:, :3], film.fps)
-    pictures = frames(env.mj_model, qpos, cameras, (film.width, film.height))
+    pictures = frames(env.mj_model, qpos, cameras, film.size, film.drawn_by)
     if target_w is not None:
         rings = [_ring(target_w, *ring) for ring in RINGS]
         pictures = (draw(p, c, rings) for p, c in zip(pictures, cameras, strict=True))

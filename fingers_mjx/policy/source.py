@@ -10,14 +10,14 @@ from pathlib import Path
 from envs.errors import InputError
 from envs.hand.nominal import vendor_hand
 from fingers_deploy import Bundle, load_bundle
-from fingers_deploy.bundle import POLICY_FILE
 from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import (
     check_interface,
     check_run_interface,
     interface_of,
 )
-from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE, RUN_FILE
+from fingers_mjx.policy.place import check_kind, is_run
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
 from fingers_mjx.runs.setup import (
     Setup,
     config_digest,
@@ -69,24 +69,6 @@ def load_source(path: Path) -> PolicySource:
     return PolicySource(path, setup, bundle.network, steps)
 
 
-def is_run(path: Path) -> bool:
-    """Whether `path` is a run directory, of whichever version."""
-    return (path / RUN_FILE).is_file()
-
-
-def is_bundle(path: Path) -> bool:
-    """Whether `path` is a bundle; one that was exported into its run is the run."""
-    exported = (path / POLICY_FILE).is_file()
-    return path.suffix == ".onnx" or (exported and not is_run(path))
-
-
-def check_run(path: Path) -> None:
-    """Raises InputError if `path` is no run directory."""
-    if not is_run(path):
-        found = "a directory without a run" if path.is_dir() else "no directory"
-        raise InputError(path, "", found, "a directory made by fingers train")
-
-
 def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
     """Reads a bundle with the settings and the hand that were exported with it.
 
@@ -95,7 +77,7 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
             export, or of a task that has changed since.
         BundleError: a bundle that is damaged or made for another hand.
     """
-    _check_kind(path)
+    check_kind(path)
     bundle = load_bundle(path, vendor_hand().joint_names)
     directory = path if path.is_dir() else path.parent
     found = config_digest(directory)
@@ -109,12 +91,3 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
     ours = interface_of(make_env(setup, 1, "cpu"))
     check_interface(bundle.source, bundle.manifest.interface, ours)
     return bundle, setup
-
-
-def _check_kind(path: Path) -> None:
-    """Refuses a path that cannot be a bundle."""
-    valid = f"a run directory, a directory with {POLICY_FILE}, or an exported ONNX file"
-    if not path.exists():
-        raise InputError(path, "", "no such file or directory", valid)
-    if path.is_dir() and not (path / POLICY_FILE).is_file():
-        raise InputError(path, "", f"a directory without {POLICY_FILE}", valid)

@@ -9,7 +9,7 @@ import numpy as np
 from envs.base import State
 from envs.errors import InputError
 from fingers_mjx.policy.actor import read
-from fingers_mjx.policy.source import is_bundle
+from fingers_mjx.policy.place import is_bundle
 
 _COUNTER = "worlds/memory/world/total_steps"
 

@@ -15,7 +15,7 @@ from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.manifest import Interface, Term
 from fingers_mjx.policy.actor import read, warm_started
 from fingers_mjx.policy.interface import interface_of
-from fingers_mjx.policy.source import is_bundle
+from fingers_mjx.policy.place import is_bundle
 from fingers_mjx.ppo.brax import PPONetworkParams
 from fingers_mjx.ppo.state import TrainState
 

@@ -7,6 +7,7 @@ from fingers_deploy.files import is_folder
 from sysid.logs.bag import BagMap, read_bag
 from sysid.logs.csv_file import read_csv, write_csv
 from sysid.logs.log import MeasuredLog
+from sysid.logs.outside import outside_suffixes, read_outside
 from sysid.logs.parquet import read_parquet, write_parquet
 
 _READ = {".csv": read_csv, ".parquet": read_parquet}
@@ -18,7 +19,8 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     """Reads a measured log.
 
     Args:
-        path: `.csv`, `.parquet`, `.mcap`, or the folder of a ROS 2 bag.
+        path: `.csv`, `.parquet`, `.mcap`, or the folder of a ROS 2 bag; or a file of
+            a suffix that another installed package reads.
         bag_map: topics, names and header of a bag or MCAP file, which says less than a
             log needs; the recordings of `fingers-deploy` need none.
 
@@ -36,6 +38,8 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
         raise InputError(
             file, "", "a map of topics", "one with a bag or MCAP file only"
         )
+    if file.suffix not in _READ and file.suffix in outside_suffixes():
+        return read_outside(file)
     return _chosen(_READ, file)(file)
 
 

@@ -16,13 +16,14 @@ from fingers_robot.cli.options import check_library, check_options, check_source
 from fingers_robot.cli.parser import number, whole
 from fingers_robot.cli.speaker import Speaker
 from fingers_robot.drivers.open import KINDS
+from fingers_robot.drivers.outside import outside_kinds
 from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
 from fingers_robot.record.log import read_log
 from fingers_robot.runtime.guard import guard_hand
 from fingers_robot.runtime.launcher import EXIT_UNKNOWN
 
 _RUN = "bundles loop_hz mounting runtime joystick sticks plan keys keyboard tracker"
-_DRIVER = "dry_run socket log side serial imu_bus imu_address imu_mount"
+_DRIVER = "dry_run device socket log side serial imu_bus imu_address imu_mount"
 _STDOUT = 1
 WIGGLES = {"all": list(range(JOINT_COUNT)), "one": [4], "none": []}
 
@@ -156,7 +157,9 @@ def guard(options: argparse.Namespace) -> int:
 
 def _add_driver(parser: argparse.ArgumentParser) -> None:
     group = parser.add_argument_group("driver")
-    group.add_argument("--driver", choices=KINDS, required=True)
+    kinds = (*KINDS, *(name for name in outside_kinds() if name not in KINDS))
+    group.add_argument("--driver", choices=kinds, required=True)
+    group.add_argument("--device", help="of a driver that another package brings")
     group.add_argument("--dry-run", action="store_true", help="never energize")
     group.add_argument("--model", help="sim: MJCF or MJB file of the hand")
     group.add_argument("--socket", help="sim: of a simulator that runs already")

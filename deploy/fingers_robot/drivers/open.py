@@ -9,6 +9,7 @@ from fingers_deploy.manifest import Interface
 from fingers_robot.drivers.bno085 import Bno085, I2cBus
 from fingers_robot.drivers.dry import DryRun
 from fingers_robot.drivers.imu_port import ImuPort, NoImu
+from fingers_robot.drivers.outside import open_outside, outside_opener
 from fingers_robot.drivers.protocol import Driver, Imu
 from fingers_robot.drivers.replay import ReplayDriver
 from fingers_robot.drivers.sim import SimDriver
@@ -16,6 +17,7 @@ from fingers_robot.drivers.wuji import WujiDriver
 from fingers_robot.record.log import read_log
 
 KINDS = ("sim", "replay", "wuji")
+"""Drivers of this package; others bring theirs, see `fingers_robot.drivers.outside`."""
 
 
 def open_driver(options: Mapping[str, Any], interface: Interface) -> Driver:
@@ -24,14 +26,16 @@ def open_driver(options: Mapping[str, Any], interface: Interface) -> Driver:
     Args:
         options: of `sim`: `socket`; of `replay`: `log`; of `wuji`: `side`, `serial`,
             `imu_bus`, `imu_address`, `imu_mount`, `without_imu` (the guard may not need
-            what has perhaps failed). Of all: `dry_run`.
+            what has perhaps failed). Of all: `dry_run`. A driver of another package
+            has `device`, and the others.
         interface: of the policy.
 
     Raises:
         InputError: the device or file is missing or does not fit the policy.
         OSError: the device does not answer.
     """
-    driver = _OPENERS[options["kind"]](options, interface)
+    opened = _OPENERS.get(options["kind"], open_outside)
+    driver = opened(options, interface)
     return DryRun(driver) if options.get("dry_run") else driver
 
 
@@ -39,10 +43,13 @@ def prepare_driver(options: Mapping[str, Any]) -> None:
     """Imports what opening a driver takes, so that it will open at once.
 
     Raises:
-        InputError: the library is missing.
+        InputError: the library is missing, or the package that brings the driver is
+            broken.
     """
     if options["kind"] == "wuji":
         _library()
+    elif options["kind"] not in _OPENERS:
+        outside_opener(options["kind"])
 
 
 def _library() -> Any:

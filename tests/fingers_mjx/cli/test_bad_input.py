@@ -134,7 +134,7 @@ SETTINGS = [
     (["eval", "bundle", "--set", "env.episode_s=1e9"], ["env.episode_s", "1e+06"]),
     (["play", "bundle", "--json", "run"], ["--json", "run", "a directory"]),
     (["play", "bundle", "--video", f"{FILE}.mp4"], ["--video", FILE]),
-    (["play", "run"], ["run", "without policy.onnx"]),
+    (["play", "."], ["policy.onnx", "run directory"]),
     (["export", "run", "--out", FILE], ["--out", FILE]),
     (["hand", "show", "--out", FILE], ["--out", FILE]),
     (["hand", "stance", "--out", "run"], ["--out", "run", "a directory"]),

@@ -139,6 +139,15 @@ def test_one_command_holds_for_every_episode(bundle_dir, tmp_path, capsys):
     assert all(json.loads(line) for line in said.err.splitlines())
 
 
+def test_a_run_plays_without_an_export_before_it(run_dir, capsys):
+    assert not (run_dir / "policy.onnx").exists()
+    before = {p.name for p in run_dir.iterdir()}
+    argv = ["play", str(run_dir), "--seconds", "0.2", "--env.episode-s", "1"]
+    assert main(argv) == 0, capsys.readouterr().err
+    assert "task_speed_mps" in capsys.readouterr().out
+    assert {p.name for p in run_dir.iterdir()} == before
+
+
 def test_play_writes_video_and_summary(bundle_dir, tmp_path, capsys):
     video, path = tmp_path / "walk.mp4", tmp_path / "play.json"
     argv = ["play", str(bundle_dir), "--seconds", "0.2", "--width", "96"]

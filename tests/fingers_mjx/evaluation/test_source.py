@@ -15,12 +15,12 @@ from fingers_mjx.evaluation import source as module
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.record import Trace
 from fingers_mjx.evaluation.source import (
-    check_policy_settings,
     evaluate_source,
     nominal,
     typical_episode,
     with_command,
 )
+from fingers_mjx.policy.place import check_policy_settings
 from fingers_mjx.policy.source import PolicySource
 
 NETWORK = SimpleNamespace(mean=np.zeros(1), std=np.ones(1), layers=())

@@ -106,10 +106,10 @@ def test_frames_show_the_recorded_poses():
     qpos = np.tile(model.qpos0, (3, 1))
     qpos[:, 0] = [0.0, 0.1, 0.2]
     still = [Camera(azimuth_deg=90.0)] * 3
-    shown = [f.astype(int) for f in frames(model, qpos, still, (80, 60), samples=1)]
+    shown = [f.astype(int) for f in frames(model, qpos, still, (80, 60))]
     red = [np.argwhere(f[..., 0] > 1.5 * f[..., 2])[:, 1].mean() for f in shown]
     assert red[0] < red[1] < red[2]
     moving = follow(still[0], qpos[:, :3], FPS, smooth_s=0.001)
-    followed = list(frames(model, qpos, moving, (80, 60), samples=1))
+    followed = list(frames(model, qpos, moving, (80, 60)))
     centre = [np.argwhere(f[..., 0] > 1.5 * f[..., 2])[:, 1].mean() for f in followed]
     assert np.ptp(centre) < 1.5
