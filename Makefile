@@ -8,7 +8,7 @@ QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 
 .DEFAULT_GOAL := help
 .PHONY: help sync cuda12 cuda13 format check test test-slow test-gpu test-versions demo \
-	battery bench build clean
+	battery bench build release clean
 
 # The ends of what pyproject.toml allows; a version, or the path of an interpreter.
 OLDEST_PYTHON := 3.11
@@ -77,6 +77,12 @@ build: sync ## Wheels, installed and tried in an environment of their own
 		"$$(echo dist/fingers_mjx-*.whl)[viz]"
 	cd build && trial/bin/fingers hand show --out trial/hand
 	cd build && trial/bin/python -c 'import fingers_deploy, rewards, envs, sysid, fingers_mjx'
+
+release: sync ## Wheels and source archives in dist/, checked for publication
+	rm -rf dist
+	$(UV) sync --locked --inexact --quiet --group release
+	$(UV) build --quiet --all-packages
+	$(RUN) twine check --strict dist/*
 
 clean: ## Remove caches and builds; runs and the environment stay
 	rm -rf .pytest_cache .ruff_cache .hypothesis .jax_cache build dist deploy/build

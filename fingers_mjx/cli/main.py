@@ -94,8 +94,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         check_places()
         args = make_parser().parse_args(words)
         refuse_empty(args)
-        args.check(args)
         check_installation()
+        args.check(args)
         _note_idle_gpu(args)
         if args.dry_run:
             print(args.preview(args), end="")

@@ -42,13 +42,7 @@ def add(commands) -> None:
     what = f"{options.POLICY_HELP}; --viewer takes the committed crawl policy"
     options.path(parser, "policy", metavar="POLICY", nargs="?", help=what)
     options.settings(parser, "a setting of the task such as env.episode_s=10")
-    parser.add_argument(
-        "--viewer",
-        action="store_true",
-        help="a page in the browser, with knobs, until Ctrl-C",
-    )
-    options.value(parser, "--port", options.whole(1024, 65535), 8080, "of the page")
-    options.path(parser, "--ghost", metavar="LOG", help="a measured log on the page")
+    _add_viewer(parser)
     options.path(
         parser,
         "--then",
@@ -88,6 +82,16 @@ def add(commands) -> None:
         "--renderer", choices=("auto", "mujoco", "raycast"), default="auto", help=what
     )
     options.path(parser, "--json", help="summary to write")
+
+
+def _add_viewer(parser) -> None:
+    parser.add_argument(
+        "--viewer",
+        action="store_true",
+        help="a page in the browser, with knobs, until Ctrl-C",
+    )
+    options.value(parser, "--port", options.whole(1024, 65535), 8080, "of the page")
+    options.path(parser, "--ghost", metavar="LOG", help="a measured log on the page")
 
 
 def _add_keys(parser) -> None:

@@ -174,6 +174,35 @@ def test_foreign_package_in_our_place_is_reported(tmp_path, name, kind):
     assert f"package {name}: found {place}" in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("foreign", "imported"),
+    [("rewards", "envs"), ("rewards", "sysid"), ("envs", "sysid.logs.read")],
+)
+def test_importing_what_needs_a_foreign_package_is_the_same_sentence(
+    tmp_path, foreign, imported
+):
+    (tmp_path / foreign).mkdir()
+    (tmp_path / foreign / "__init__.py").touch()
+    path = os.pathsep.join([str(tmp_path), str(ROOT), str(ROOT / "deploy")])
+
+    def imports(*paths):
+        return subprocess.run(
+            [sys.executable, "-c", f"import {imported}"],
+            cwd=tmp_path.parent,
+            env=os.environ | {"PYTHONPATH": os.pathsep.join(paths)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+
+    done = imports(path)
+    assert done.returncode == 1
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith(f"ImportError: package {foreign}: found {tmp_path}")
+    assert f"run it from a directory without {foreign}" in last
+    assert imports(str(ROOT), str(ROOT / "deploy")).returncode == 0
+
+
 def test_our_own_packages_are_in_their_place():
     check_places(ROOT)
     with pytest.raises(UnsupportedInstallation, match="package rewards"):

@@ -1,0 +1,1 @@
+"""A task, a driver and a log reader from outside."""
