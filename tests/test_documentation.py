@@ -10,6 +10,7 @@ import pytest
 import yaml
 
 from envs import registry
+from envs.errors import InputError
 from fingers_mjx.cli.main import UsageError, make_parser
 
 ROOT = Path(__file__).parents[1]
@@ -86,7 +87,7 @@ def test_wrong_commands_would_be_seen():
     assert list(commands("```sh\nfingers train --no-such x  # why\n```")) == [
         ["fingers", "train", "--no-such", "x"]
     ]
-    with pytest.raises(UsageError):
+    with pytest.raises((UsageError, InputError)):
         make_parser().parse_args(["train", "--no-such", "x"])
 
 
