@@ -8,7 +8,7 @@ QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 
 .DEFAULT_GOAL := help
 .PHONY: help sync cuda12 cuda13 format check test test-slow test-gpu test-versions demo \
-	battery bench build release clean
+	notebooks battery bench build release clean
 
 # The ends of what pyproject.toml allows; a version, or the path of an interpreter.
 OLDEST_PYTHON := 3.11
@@ -62,6 +62,9 @@ test-versions: $(filter .uv/bin/uv,$(UV)) ## Tests with the oldest and newest JA
 
 demo: sync ## The walking hand: evaluate, play, train, export, one report
 	$(RUN) fingers demo
+
+notebooks: sync ## Execute all notebooks and keep their outputs
+	$(RUN) python -m notebooks.execute
 
 battery: sync ## Hide effects, ask the diagnosis, count how often it is right (hours)
 	$(RUN) python -m benchmarks.diagnosis.battery --out build/battery

@@ -32,6 +32,7 @@ COMMANDS = (
     "export",
     "play",
     "hand",
+    "log",
     "tasks",
     "doctor",
 )

@@ -98,6 +98,7 @@ class TrainConfig:
         log_every: iterations between two rows of metrics.
         checkpoint_every: iterations between two checkpoints.
         keep_checkpoints: newest checkpoints kept on disk.
+        video_every: iterations between two videos of the policy; 0 for none.
         on_overflow: what to do when Warp had no space for all contacts and dropped some
             of them: "stop" with what to set, or "warn" and go on; see
             `envs.physics.room`.
@@ -115,6 +116,7 @@ class TrainConfig:
     log_every: int = _number(10, 1, MAX_ITERATIONS, free=True)
     checkpoint_every: int = _number(200, 1, MAX_ITERATIONS, free=True)
     keep_checkpoints: int = _number(3, 1, MAX_ITERATIONS, free=True)
+    video_every: int = _number(0, 0, MAX_ITERATIONS, free=True)
     on_overflow: Literal["stop", "warn"] = _free("stop")
     hang_limit_s: float = _number(300.0, POSITIVE, free=True)
     ppo: PpoConfig = dataclasses.field(default_factory=PpoConfig)
@@ -241,7 +243,7 @@ def check_config(config: TrainConfig, source: object = "configuration") -> None:
     from_dict(TrainConfig, to_dict(config), source)
     parts = config.ppo.minibatches
     _check_multiple(source, "num_envs", config.num_envs, "ppo.minibatches", parts)
-    for name in ("iterations", "log_every", "checkpoint_every"):
+    for name in ("iterations", "log_every", "checkpoint_every", "video_every"):
         value, per_call = getattr(config, name), config.iterations_per_call
         _check_multiple(source, name, value, "iterations_per_call", per_call)
     for name in ("actor_layers", "critic_layers"):

@@ -2,6 +2,7 @@
 
 import json
 import math
+import struct
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -15,6 +16,7 @@ from envs.errors import InputError
 from fingers_deploy.errors import shortened
 from fingers_deploy.files import open_regular, read_regular
 from fingers_mjx.runs.files import room_for, write_whole
+from fingers_mjx.runs.videos import video_files
 
 Row = Mapping[str, Any]
 _STEP, _TIME = "iteration", "time_s"
@@ -45,6 +47,9 @@ class MetricsLog:
             self._write_event(Event(wall_time=0.0, file_version="brain.Event:2"))
             for row in rows:
                 self._write_event(_event(row))
+            for at, path in video_files(directory).items():
+                if at <= iteration:
+                    self._write_event(_video_event(at, path))
             self._events.flush()
 
     def append(self, row: Row) -> None:
@@ -58,6 +63,20 @@ class MetricsLog:
             with self._path.open("a", encoding="utf-8") as file:
                 file.write(line)
             self._write_event(_event(row))
+            self._events.flush()
+
+    def append_video(self, iteration: int, path: Path) -> None:
+        """Adds a video of the policy, which TensorBoard shows among the images.
+
+        Args:
+            iteration: of the policy.
+            path: of a GIF.
+
+        Raises:
+            OutOfSpace: if the disk is full.
+        """
+        with room_for(self._path, path.stat().st_size):
+            self._write_event(_video_event(iteration, path))
             self._events.flush()
 
     def __enter__(self) -> "MetricsLog":
@@ -142,3 +161,14 @@ def _event(row: Row) -> Event:
     ]
     summary = Summary(value=values)
     return Event(wall_time=row[_TIME], step=row[_STEP], summary=summary)
+
+
+def _video_event(iteration: int, path: Path) -> Event:
+    """Returns a GIF as one TensorBoard event; its size stands in its first bytes."""
+    content = read_regular(path, MAX_BYTES)
+    width, height = struct.unpack("<HH", content[6:10])
+    image = Summary.Image(
+        height=height, width=width, colorspace=3, encoded_image_string=content
+    )
+    summary = Summary(value=[Summary.Value(tag="policy", image=image)])
+    return Event(wall_time=path.stat().st_mtime, step=iteration, summary=summary)

@@ -15,6 +15,7 @@ from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.metrics import MetricsLog
 from fingers_mjx.training.dump import dump_state
 from fingers_mjx.training.errors import Diverged, Interrupted
+from fingers_mjx.training.films import Films
 from fingers_mjx.training.member import Place
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.row import Window, speed
@@ -34,6 +35,7 @@ class LoopServices:
         logs: learning curves of the members.
         on_progress: called with every event.
         stop: whether a signal asks the run to stop.
+        films: videos of the members.
         watchdog: ends a run that no longer advances.
         ticker: reports "compiling" until the first call is done.
     """
@@ -42,6 +44,7 @@ class LoopServices:
     logs: Sequence[MetricsLog]
     on_progress: OnProgress
     stop: StopSignals
+    films: Films
     watchdog: Watchdog
     ticker: Ticker
 
@@ -104,8 +107,19 @@ class Loop:
                 raise Interrupted(self._save(), self.iteration)
             if self._due(self.config.checkpoint_every):
                 self._save()
+            self._film()
         self._save()
+        self.services.films.finish()
         return self.ended
+
+    def _film(self) -> None:
+        """Begins a video that is due and takes in one that is done."""
+        films = self.services.films
+        films.collect()
+        if films.due(self.iteration):
+            self._land()
+            films.start(self.session.split(self.carry), self.iteration)
+            self._mark_s = time.monotonic()
 
     def _due(self, every: int) -> bool:
         """Whether something done every so many iterations is due."""

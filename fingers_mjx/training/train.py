@@ -14,6 +14,7 @@ from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
+from fingers_mjx.training.films import Films
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
 from fingers_mjx.training.member import END_FILE, Place, read_end
 from fingers_mjx.training.population import Member, check_population
@@ -164,7 +165,11 @@ def _run(
             config = {"train": place.setup.train, "env": place.setup.env}
             record_run(place.path, config, place.bound, place.setup.hand)
         logs = [stack.enter_context(_curve(one, begin)) for one in files]
-        services = LoopServices(places, logs, on_progress, stop, watchdog, ticker)
+        films = Films(setups[0].train, places, logs, say)
+        stack.callback(films.stop)
+        services = LoopServices(
+            places, logs, on_progress, stop, films, watchdog, ticker
+        )
         return Loop(session, services, begin).run()
 
 

@@ -16,6 +16,7 @@ import numpy as np
 
 from envs.errors import InputError, one_of
 from fingers_deploy.files import open_regular
+from sysid.logs.bag_write import HEADER, KEYS, ROWS, kept_log
 from sysid.logs.columns import MAX_CELLS, MAX_COLUMNS, standard_units
 from sysid.logs.log import Load, LogHeader, MeasuredLog
 from sysid.logs.ros_messages import READERS
@@ -75,7 +76,10 @@ def read_bag(path: Path, bag_map: BagMap | None = None) -> MeasuredLog:
     _check_folder(path)
     if bag_map is None:
         with _opened(path) as reader:
-            own = OWN_TOPIC in {connection.topic for connection in reader.connections}
+            topics = {connection.topic for connection in reader.connections}
+        if HEADER in topics:
+            return kept_log(path, _kept(path))
+        own = OWN_TOPIC in topics
         bag_map = OWN_MAP if own else BagMap()
     rows = _Rows(path, bag_map)
     for topic, kind, received_ns, message in _messages(path, bag_map):
@@ -178,6 +182,17 @@ def _check_folder(path: Path) -> None:
     for file in inner:
         if file != path and home not in file.resolve().parents:
             raise InputError(path, file.name, file.resolve(), "files inside the folder")
+
+
+def _kept(path: Path) -> Iterator[tuple[str, Any]]:
+    """Yields topic and contents of the messages that keep a log whole."""
+    from rosbags.typesys import Stores, get_typestore
+
+    types = get_typestore(Stores.LATEST)
+    with _opened(path) as reader:
+        wanted = [c for c in reader.connections if c.topic in (HEADER, ROWS, KEYS)]
+        for connection, _, data in reader.messages(wanted):
+            yield connection.topic, types.deserialize_cdr(data, connection.msgtype)
 
 
 def _messages(path: Path, bag_map: BagMap) -> Iterator[tuple[str, str, int, Any]]:

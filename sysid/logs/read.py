@@ -5,13 +5,17 @@ from pathlib import Path
 from envs.errors import InputError
 from fingers_deploy.files import is_folder
 from sysid.logs.bag import BagMap, read_bag
+from sysid.logs.bag_write import write_bag, write_mcap
 from sysid.logs.csv_file import read_csv, write_csv
+from sysid.logs.lerobot import is_lerobot, read_lerobot, write_lerobot
 from sysid.logs.log import MeasuredLog
 from sysid.logs.outside import outside_suffixes, read_outside
 from sysid.logs.parquet import read_parquet, write_parquet
 
 _READ = {".csv": read_csv, ".parquet": read_parquet}
-_WRITE = {".csv": write_csv, ".parquet": write_parquet}
+_WRITE = {".csv": write_csv, ".parquet": write_parquet, ".mcap": write_mcap}
+FOLDERS = {"bag": write_bag, "lerobot": write_lerobot}
+"""Formats that are folders, which no suffix distinguishes."""
 _VALID = "a .csv, .parquet or .mcap file, or the folder of a ROS 2 bag"
 
 
@@ -32,6 +36,8 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     folder = is_folder(file)
     if not file.exists():
         raise InputError(file, "", "no such file", _VALID)
+    if folder and is_lerobot(file):
+        return read_lerobot(file)
     if folder or file.suffix == ".mcap":
         return read_bag(file, bag_map)
     if bag_map is not None:
@@ -43,14 +49,22 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     return _chosen(_READ, file)(file)
 
 
-def write_log(log: MeasuredLog, path: str | Path) -> None:
-    """Writes a log as `.csv` or `.parquet`.
+def write_log(log: MeasuredLog, path: str | Path, folder: str | None = None) -> None:
+    """Writes a log as `.csv`, `.parquet` or `.mcap`, or as a folder.
+
+    Args:
+        log: it is read back as it is, to the bit.
+        path: of the file or folder.
+        folder: one of `FOLDERS`.
 
     Raises:
-        InputError: another suffix.
+        InputError: another suffix, or a log that the format cannot hold.
         ModuleNotFoundError: the optional dependencies `data` are missing.
     """
     file = Path(path)
+    if folder is not None:
+        FOLDERS[folder](log, file)
+        return
     _chosen(_WRITE, file)(log, file)
 
 

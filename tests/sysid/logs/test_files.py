@@ -135,8 +135,8 @@ def test_names_that_are_no_log(tmp_path):
     (tmp_path / "x.txt").write_text(GOOD)
     with pytest.raises(InputError, match=r"found \.txt"):
         read_log(tmp_path / "x.txt")
-    with pytest.raises(InputError, match=r"found \.mcap"):
-        write_log(small_log(), tmp_path / "x.mcap")
+    with pytest.raises(InputError, match=r"found \.db3"):
+        write_log(small_log(), tmp_path / "x.db3")
 
 
 @pytest.mark.parametrize("suffix", [".csv", ".parquet", ".mcap"])
