@@ -85,14 +85,12 @@ def test_sizes_at_the_end_of_their_range_explain_nothing(searched):
     problem = searched.problem
     (i,) = problem.space.of("encoder_scale")
     model = fit_models(problem, [("encoder_scale",)], [searched.base.fit.theta])[0]
-    assert unexplained_signs(replace(searched, best=model)) == []
+    met = "encoder_scale.scale met its bound"
+    assert met not in str(unexplained_signs(replace(searched, best=model)))
     theta = model.fit.theta.copy()
     theta[i] = problem.space.slots[i].high
     edge = replace(model, fit=replace(model.fit, theta=theta, bounded=(i,)))
-    assert (
-        "encoder_scale.scale met its bound"
-        in unexplained_signs(replace(searched, best=edge))[0]
-    )
+    assert met in str(unexplained_signs(replace(searched, best=edge)))
 
 
 def test_a_cause_that_moves_a_parameter_off_its_prior_is_not_all(searched):
