@@ -8,7 +8,7 @@ QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 
 .DEFAULT_GOAL := help
 .PHONY: help sync cuda12 cuda13 format check test test-slow test-gpu test-versions demo \
-	notebooks battery bench build release clean
+	notebooks docs battery bench build release clean
 
 # The ends of what pyproject.toml allows; a version, or the path of an interpreter.
 OLDEST_PYTHON := 3.11
@@ -65,6 +65,10 @@ demo: sync ## The walking hand: evaluate, play, train, export, one report
 
 notebooks: sync ## Execute all notebooks and keep their outputs
 	$(RUN) python -m notebooks.execute
+
+docs: sync ## The documentation as a site, into build/site/
+	$(RUN) python -m docs.stage
+	NO_MKDOCS_2_WARNING=1 JUPYTER_PLATFORM_DIRS=1 $(RUN) mkdocs build --strict
 
 battery: sync ## Hide effects, ask the diagnosis, count how often it is right (hours)
 	$(RUN) python -m benchmarks.diagnosis.battery --out build/battery

@@ -55,7 +55,7 @@ def render(
     look: Look | None = None,
     samples: int = 2,
 ) -> UInt8[np.ndarray, "h w 3"]:
-    """Returns a picture of the scene, sRGB in [0, 255] [1].
+    """Returns a picture of the scene, sRGB [1] in 0 … 255.
 
     A pixel is the mean = Σ colours / samples² of rays on a grid inside it; away from
     edges, where that changes nothing, of one ray.
@@ -176,7 +176,7 @@ def bounding_sphere(
 
 
 def geom_colours(model: mujoco.MjModel) -> Float[np.ndarray, "geoms 3"]:
-    """Returns each geom's sRGB colour in [0, 1] [1] = its own, else its material's.
+    """Returns each geom's sRGB colour [1] in 0 … 1 = its own, else its material's.
 
     Source:
         MuJoCo's XML reference: rgba of a geom counts where it is not the default.
