@@ -163,13 +163,25 @@ def _row(colours: Sequence[Rgb], text: str) -> str:
     return f"<div>{dots} {text}</div>"
 
 
-def _command_sliders(gui: viser.GuiApi, knobs: Knobs) -> list[viser.GuiSliderHandle]:
+def _command_knob(
+    gui: viser.GuiApi, label: str, range_: tuple[float, float], start: float
+) -> viser.GuiInputHandle[float]:
+    """Returns a slider; a number that stays where training knew only one."""
+    low, high = range_
+    if low == high:
+        return gui.add_number(label, start, disabled=True)
+    return gui.add_slider(label, low, high, (high - low) / 64, start)
+
+
+def _command_sliders(
+    gui: viser.GuiApi, knobs: Knobs
+) -> list[viser.GuiInputHandle[float]]:
     if knobs.ranges is None:
         return []
     labels = ("forward [m/s]", "left [m/s]", "turn [rad/s]")
     with gui.add_folder("Command"):
         return [
-            gui.add_slider(label, low, high, (high - low) / 64, start)
+            _command_knob(gui, label, (low, high), start)
             for label, (low, high), start in zip(
                 labels, knobs.ranges, knobs.command, strict=True
             )

@@ -9,7 +9,9 @@ from support.free_port import free_port
 
 from envs.errors import InputError
 from fingers_mjx.play.viewer import watch as module
+from fingers_mjx.play.viewer.colours import OKABE_ITO
 from fingers_mjx.play.viewer.page import serving
+from fingers_mjx.play.viewer.panel import Knobs, Panel
 from fingers_mjx.play.viewer.watch import knobs_for, watch
 
 
@@ -64,3 +66,10 @@ def test_the_page_is_served_and_drawn_until_it_ends(watched, capsys, monkeypatch
     with socket.socket() as probe:  # the port is free again
         probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
         probe.bind(("127.0.0.1", port))
+
+
+def test_where_training_knew_one_command_there_is_nothing_to_slide():
+    knobs = Knobs(((0.0, 0.0), (-0.1, 0.1), (0.2, 0.2)), (0.0, 0.0, 0.2), ())
+    with serving(free_port()) as server:
+        panel = Panel(server, knobs, OKABE_ITO)
+        assert panel.wishes().command == (0.0, 0.0, 0.2)
