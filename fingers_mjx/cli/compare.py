@@ -8,7 +8,7 @@ import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 if TYPE_CHECKING:
     from fingers_mjx.studies.comparison.comparison import Comparison

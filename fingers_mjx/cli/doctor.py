@@ -17,8 +17,8 @@ from collections.abc import Iterator, Mapping
 from importlib import metadata
 from typing import Any, NamedTuple
 
-from fingers_mjx.cli import gpu, installation
-from fingers_mjx.cli.installation import UnsupportedInstallation
+from fingers_mjx.cli.machine import gpu, installation
+from fingers_mjx.cli.machine.installation import UnsupportedInstallation
 
 SICK = 1
 """Exit status where something is wrong."""
@@ -40,7 +40,7 @@ PROBE_S = 180.0
 _GL = ("", "egl", "glfw", "osmesa", "glx", "wgl", "cgl", "off", "disable", "disabled")
 _PROBE = """
 import json
-from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 prepare_jax()
 import jax
 from envs.config.plugins import found, load
@@ -68,7 +68,7 @@ class Finding(NamedTuple):
 
 def add(commands) -> None:
     """Adds the command."""
-    from fingers_mjx.cli import options
+    from fingers_mjx.cli.arguments import options
 
     options.command(
         commands,

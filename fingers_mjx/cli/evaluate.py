@@ -8,8 +8,8 @@ import sys
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError
-from fingers_mjx.cli import options
-from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from fingers_mjx.runs.setup import Setup

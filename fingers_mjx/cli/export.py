@@ -2,7 +2,7 @@
 
 import argparse
 
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 
 def add(commands) -> None:

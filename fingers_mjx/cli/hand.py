@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 if TYPE_CHECKING:
     from envs.hand.hand_file import HandFile

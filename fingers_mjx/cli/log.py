@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from fingers_mjx.cli import options, records
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.sysid import records
 
 
 def add(commands) -> None:

@@ -13,14 +13,14 @@ from collections.abc import Sequence
 
 from fingers_deploy.errors import shortened
 from fingers_mjx.cli import doctor
-from fingers_mjx.cli.gpu import idle_gpu, quiet_jax
-from fingers_mjx.cli.installation import (
+from fingers_mjx.cli.arguments.parser import CommandParser
+from fingers_mjx.cli.machine.gpu import idle_gpu, quiet_jax
+from fingers_mjx.cli.machine.installation import (
     UnsupportedInstallation,
     check_installation,
     check_places,
 )
-from fingers_mjx.cli.jax_ready import prepare_jax
-from fingers_mjx.cli.parser import CommandParser
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 from fingers_robot.cli.parser import UsageError, refuse_empty
 
 COMMANDS = (
@@ -36,7 +36,7 @@ COMMANDS = (
     "tasks",
     "doctor",
 )
-SYSID = ("log_info", "excite", "calibrate", "diagnose", "transfer")
+SYSID = ("info", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 
 BAD_INPUT, KEYBOARD = 2, 130
@@ -63,7 +63,7 @@ def make_parser() -> argparse.ArgumentParser:
         "of a sweep missing, 6 an installation that cannot work, 75 stopped by a "
         "signal after saving (go on with --resume).",
     )
-    _add(parser, "completion")
+    _add(parser, "arguments.completion")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
         _add(commands, name)
@@ -71,7 +71,7 @@ def make_parser() -> argparse.ArgumentParser:
     sysid = commands.add_parser("sysid", help=summary, description=f"L{summary[1:]}.")
     actions = sysid.add_subparsers(metavar="ACTION", required=True)
     for name in SYSID:
-        _add(actions, name)
+        _add(actions, f"sysid.{name}")
     _add(commands, "demo")
     return parser
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from fingers_mjx.cli import options
-from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
 from fingers_mjx.play.sokoban import LEVELS
 
@@ -122,6 +122,7 @@ def run(args: argparse.Namespace) -> int:
     """Plays; a run that was not exported is, for as long as it takes."""
     from fingers_mjx.export.run import as_bundle
 
+    args.title = args.policy.name  # that of a run, not of the bundle made for it
     with as_bundle(args.policy) as args.policy, as_bundle(args.then) as args.then:
         return _play(args)
 
@@ -190,9 +191,9 @@ def _watch(args: argparse.Namespace) -> int:
     command = None
     if args.commands and args.then is None:  # the page has sliders for it
         command, args.commands = tuple(args.commands[0]), None
-    setup, name = _setup(args, trained), args.policy.name
+    setup = _setup(args, trained)
     watched = Watched(
-        f"{trained.train.task}: {name}",
+        f"{trained.train.task}: {args.title}",
         setup,
         lambda setup: _player(args, setup, bundle),
         args.seed,

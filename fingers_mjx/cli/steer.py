@@ -8,7 +8,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 
 def add(commands) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from envs.errors import InputError
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 if TYPE_CHECKING:
     from envs.config.documented import Setting

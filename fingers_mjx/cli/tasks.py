@@ -3,7 +3,7 @@
 import argparse
 import inspect
 
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 
 def add(commands) -> None:

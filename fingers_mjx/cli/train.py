@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
-from fingers_mjx.cli import options
-from fingers_mjx.cli.jax_ready import prepare_jax
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

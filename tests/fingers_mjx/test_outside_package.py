@@ -13,7 +13,7 @@ from envs.config import plugins
 from envs.errors import InputError
 from envs.registry import get_task, task_names
 from fingers_deploy import load_bundle
-from fingers_mjx.cli.completion import candidates
+from fingers_mjx.cli.arguments.completion import candidates
 from fingers_mjx.cli.main import main, make_parser
 from fingers_robot.drivers.open import open_driver, prepare_driver
 from fingers_robot.drivers.outside import outside_kinds

@@ -4,7 +4,8 @@ from importlib import metadata
 
 import pytest
 
-from fingers_mjx.cli import doctor, gpu, installation
+from fingers_mjx.cli import doctor
+from fingers_mjx.cli.machine import gpu, installation
 from fingers_mjx.cli.main import main
 from fingers_mjx.ppo.config import PRESETS
 

@@ -12,8 +12,8 @@ from support import effects_hand as rig
 import fingers_mjx
 from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
-from fingers_mjx.cli.diagnose import walk_setup
 from fingers_mjx.cli.main import main
+from fingers_mjx.cli.sysid.diagnose import walk_setup
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play.episodes import schedule_of
 from fingers_mjx.play.log import WalkNoise, WalkRecorder

@@ -6,8 +6,10 @@ from importlib.metadata import EntryPoint
 
 import pytest
 
-from fingers_mjx.cli import gpu, main
-from fingers_mjx.cli.gpu import chose_cpu, idle_gpu, sees_gpu
+from fingers_mjx.cli import main
+from fingers_mjx.cli.machine import gpu
+from fingers_mjx.cli.machine.gpu import chose_cpu, idle_gpu, sees_gpu
+from fingers_mjx.cli.play import CRAWL_POLICY
 
 NATIVE, WSL = "dev/nvidia3", "usr/lib/wsl/lib/libcuda.so.1"
 
@@ -96,14 +98,20 @@ def test_who_did_not_is_not(monkeypatch, machine, environment):
     assert idle_gpu(None, environment, machine) is not None
 
 
+CRAWL = str(CRAWL_POLICY)
 COMPUTING = [
-    ["train", "no-task"],
-    ["eval", "no-run"],
+    ["train", "crawl", "--hand", "/dev/null"],
+    ["eval", CRAWL, "--json", "/dev/null/file"],
     ["demo", "--out", "/dev/null/demo"],
     ["sysid", "diagnose", "no-log"],
     ["sysid", "calibrate", "no-log"],
 ]
-OTHER = [["export", "no-run"], ["play", "no-bundle"], ["sysid", "info", "no-log"]]
+OTHER = [
+    ["train", "no-task"],  # refused before anything is looked for
+    ["export", "no-run"],
+    ["play", "no-bundle"],
+    ["sysid", "info", "no-log"],
+]
 
 
 @pytest.mark.parametrize("words", COMPUTING + OTHER, ids=" ".join)

@@ -32,7 +32,7 @@ class CommandParser(Parser):
         """
         if self.offered is None or args is None:
             return super().parse_known_args(args, namespace)
-        from fingers_mjx.cli.flags import assignments, divided
+        from fingers_mjx.cli.arguments.flags import assignments, divided
 
         own = [name for action in self._actions for name in action.option_strings]
         words, flags = divided(args, own)
@@ -51,7 +51,7 @@ class CommandParser(Parser):
         offered: Callable[[argparse.Namespace], Iterable[Setting]],
     ) -> None:
         """Prints the help of the command, and that of the settings it would take."""
-        from fingers_mjx.cli.flags import show
+        from fingers_mjx.cli.arguments.flags import show
 
         try:
             found = super().parse_known_args(words)[0]

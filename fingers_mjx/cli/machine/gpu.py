@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
-from fingers_mjx.cli.installation import DISTRIBUTION, source_tree
+from fingers_mjx.cli.machine.installation import DISTRIBUTION, source_tree
 
 SIGNS = ("dev/nvidia[0-9]*", "usr/lib/wsl/lib/libcuda.so.1")
 """Files that only a visible NVIDIA GPU has, of Linux and of WSL 2."""

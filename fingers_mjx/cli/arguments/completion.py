@@ -9,8 +9,8 @@ from typing import Any
 from envs.config.settings.backend import BACKENDS
 from envs.errors import InputError
 from envs.registry import task_names
-from fingers_mjx.cli.flags import flag
-from fingers_mjx.cli.parser import CommandParser
+from fingers_mjx.cli.arguments.flags import flag
+from fingers_mjx.cli.arguments.parser import CommandParser
 from fingers_mjx.ppo.config import PRESETS
 from fingers_robot.cli.parser import UsageError
 

@@ -17,8 +17,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 from packaging.version import Version
 
-from fingers_mjx.cli import installation
-from fingers_mjx.cli.installation import (
+from fingers_mjx.cli.machine import installation
+from fingers_mjx.cli.machine.installation import (
     UnsupportedInstallation,
     check_installation,
     check_places,
@@ -27,7 +27,7 @@ from fingers_mjx.cli.installation import (
 )
 from fingers_mjx.cli.main import main
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 NEVER = {
     "jax": ["0.10.0", "0.10.1", "0.10.2", "0.11.0"],
     "jaxlib": ["0.10.0", "0.10.1", "0.10.2", "0.11.0"],

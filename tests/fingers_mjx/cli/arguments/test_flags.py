@@ -8,8 +8,8 @@ import pytest
 from envs.config.documented import settings_of
 from envs.errors import InputError
 from envs.registry import get_task, task_names
-from fingers_mjx.cli.completion import SCRIPTS, candidates
-from fingers_mjx.cli.flags import assignments, divided
+from fingers_mjx.cli.arguments.completion import SCRIPTS, candidates
+from fingers_mjx.cli.arguments.flags import assignments, divided
 from fingers_mjx.cli.main import main, make_parser
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.runs.settings import load_settings

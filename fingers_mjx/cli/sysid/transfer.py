@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 if TYPE_CHECKING:
     from fingers_mjx.policy.source import PolicySource

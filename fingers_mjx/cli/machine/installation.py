@@ -9,7 +9,7 @@ from typing import Any
 
 DISTRIBUTION = "fingers-mjx"
 OURS = ("rewards", "envs", "sysid")
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 """Directory from which `fingers_mjx` was imported."""
 
 

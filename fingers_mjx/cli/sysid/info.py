@@ -2,7 +2,8 @@
 
 import argparse
 
-from fingers_mjx.cli import options, records
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.sysid import records
 
 
 def add(actions) -> None:

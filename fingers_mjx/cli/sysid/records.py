@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from envs.errors import InputError
-from fingers_mjx.cli import options
+from fingers_mjx.cli.arguments import options
 
 if TYPE_CHECKING:
     from sysid.logs.log import MeasuredLog

@@ -14,12 +14,12 @@ from envs.config.settings.backend import BACKENDS
 from envs.errors import InputError, one_of
 from fingers_deploy.errors import shortened
 from fingers_deploy.files import is_folder
-from fingers_mjx.cli.gpu import install_command
+from fingers_mjx.cli.machine.gpu import install_command
 from fingers_robot.cli.parser import plain_number, plain_whole
 
 if TYPE_CHECKING:
     from envs.config.documented import Setting
-    from fingers_mjx.cli.parser import CommandParser
+    from fingers_mjx.cli.arguments.parser import CommandParser
     from fingers_mjx.ppo.config import TrainConfig
 
 MAX_SEED = 2**32 - 1

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from fingers_mjx.cli import options, records
+from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.sysid import records
 
 if TYPE_CHECKING:
     from sysid.calibration.calibrate import Calibration

@@ -4,7 +4,7 @@ import pytest
 from support.sysid_logs import small_log
 
 from envs.errors import InputError
-from fingers_mjx.cli import records
+from fingers_mjx.cli.sysid import records
 from sysid.logs.read import write_log
 
 

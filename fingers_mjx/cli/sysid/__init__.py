@@ -1,0 +1,1 @@
+"""`fingers sysid`: one module for each of its actions."""
