@@ -9,9 +9,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
+from envs.config.strict_yaml import MAX_YAML_BYTES
 from envs.config.typed import dump_yaml, load_yaml, override
 from envs.errors import InputError
 from envs.registry import get_task
+from fingers_deploy.files import read_regular
 from fingers_mjx.ppo.config import TrainConfig, check_config
 from fingers_mjx.runs.directory import CONFIG_FILE, RUN_FILE, saved_bound
 
@@ -55,10 +57,19 @@ def load_settings(config_file: Path, task: str) -> Settings:
             version.
     """
     config: Any = load_yaml(_config_class(task), config_file)
+    _check_whole(config_file)
     if config.train.task != task:
         raise InputError(config_file, "train.task", config.train.task, task)
     check_config(config.train, config_file)
     return Settings(config.train, config.env)
+
+
+def _check_whole(config_file: Path) -> None:
+    """Refuses half a file: what is left may be YAML, and the rest has defaults."""
+    content = read_regular(config_file, MAX_YAML_BYTES)
+    if not content.endswith(b"\n"):
+        found = f"no end of line after {content.splitlines()[-1].decode()!r}"
+        raise InputError(config_file, "", found, "a whole file; this one is cut off")
 
 
 def run_settings(run_dir: Path) -> Settings:

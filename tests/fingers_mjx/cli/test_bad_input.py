@@ -139,7 +139,7 @@ SETTINGS = [
     (["hand", "show", "--out", FILE], ["--out", FILE]),
     (["hand", "stance", "--out", "run"], ["--out", "run", "a directory"]),
     (["demo", "--out", FILE], ["--out", FILE]),
-    (["demo", "--policy", "run"], ["run", "without policy.onnx"]),
+    (["demo", "--policy", "run"], ["run", "policy.onnx"]),
 ]
 
 

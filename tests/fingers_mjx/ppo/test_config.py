@@ -119,4 +119,5 @@ def test_only_what_does_not_touch_learning_is_free():
         "keep_checkpoints",
         "on_overflow",
         "hang_limit_s",
+        "video_every",
     }
