@@ -19,6 +19,7 @@ import numpy as np
 from envs.errors import InputError
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.problem import Problem, make_problem
 from sysid.diagnosis.search.search import Examined, search
 from sysid.diagnosis.search.space import make_space
@@ -82,7 +83,7 @@ def _examined(
         return Examined(track, None, None)
     result = search(problem)
     decided = result.problem
-    equations = getattr(decided, "equations", None) or decided
+    equations = decided.equations if isinstance(decided, OutputProblem) else decided
     return Examined(decided.data, equations, result)
 
 

@@ -25,7 +25,7 @@ from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.search.parameters import Space
-from sysid.diagnosis.search.problem import LANES, Problem
+from sysid.diagnosis.search.problem import Problem, in_lanes
 
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
@@ -61,19 +61,17 @@ def simulated(
     window = max(round(WINDOW_S / dt), 8) if driven else steps
     fixed = (dt / substeps, substeps, _acting(problem.space, thetas), window, driven)
     parts = []
-    for first in range(0, len(thetas), LANES):
-        some = thetas[first : first + LANES]
-        lanes = np.concatenate([some, np.repeat(some[:1], LANES - len(some), 0)])
+    for lanes, count in in_lanes(thetas):
         params, nuisance = problem.space.values(lanes)
         angles = _simulated(problem.data.track, params, nuisance, *fixed)
-        parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[: len(some)])
+        parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[:count])
     return np.concatenate(parts)
 
 
 def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
     """Effects that any candidate has: those at their identity cost time alone.
 
-    Rounded up to half a dozen, so that few different programs are compiled.
+    Those of the command path are always there: fewer programs are compiled.
     """
     away = {
         slot.effect

@@ -6,7 +6,7 @@ enters; without repeats it is what neighbouring samples do not share (`noise_flo
 and a candidate's residual that is larger counts with its correlation in time.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -33,6 +33,14 @@ from sysid.logs.log import MeasuredLog
 
 LANES = 64
 """Number of candidates that are evaluated at once."""
+
+
+def in_lanes(thetas: np.ndarray) -> Iterator[tuple[np.ndarray, int]]:
+    """Yields batches of `LANES` candidates, the last filled up, and their number."""
+    for first in range(0, len(thetas), LANES):
+        some = thetas[first : first + LANES]
+        filled = np.repeat(some[:1], LANES - len(some), 0)
+        yield np.concatenate([some, filled]), len(some)
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +87,7 @@ class Problem:
             Ours.
         """
         parts = []
-        for first in range(0, len(thetas), LANES):
-            some = thetas[first : first + LANES]
-            lanes = np.concatenate([some, np.repeat(some[:1], LANES - len(some), 0)])
+        for lanes, count in in_lanes(thetas):
             params, nuisance = self.space.values(lanes)
             out = equation_error(
                 self.data.track,
@@ -91,7 +97,7 @@ class Problem:
                 self.data.dt,
                 self.space.effects,
             )
-            parts.append(np.moveaxis(np.asarray(out, float), -1, 0)[: len(some)])
+            parts.append(np.moveaxis(np.asarray(out, float), -1, 0)[:count])
         weight = self.weight if weigh else 1.0
         return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
 
