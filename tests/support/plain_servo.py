@@ -17,7 +17,12 @@ ARM = """
 </body></worldbody></mujoco>"""
 
 
-def servo(cmd, row_s, late_s=0.0, dt=0.0005):
+def still(t_s):
+    """No push."""
+    return 0.0 * t_s
+
+
+def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0005):
     """Angles and torques of a servo without low-pass: read, then the target is sent."""
     q = v = 0.0
     angle, torque = [], []
@@ -28,18 +33,18 @@ def servo(cmd, row_s, late_s=0.0, dt=0.0005):
         if k % rows == 0:
             angle.append(q)
             torque.append(drive)
-        rest = drive - WEIGHT * 9.81 * np.sin(q)
+        rest = drive - WEIGHT * 9.81 * np.sin(q) + push(k * dt)
         v = (v + dt * (rest + KD * v) / INERTIA) / (1.0 + dt * KD / INERTIA)
         v = np.sign(v) * max(abs(v) - COULOMB * dt / INERTIA, 0.0)
         q += dt * v
     return np.array(angle), np.array(torque)
 
 
-def problem_with(late_s=0.0, known="both", row_s=0.02):
+def problem_with(late_s=0.0, known="both", row_s=0.02, push=still):
     """The equations of one record of it."""
     t_s = np.arange(0.0, 8.0, row_s)
     cmd = 1.2 * np.sin(2.0 * t_s) * np.cos(0.5 * t_s) + 0.3 * np.sin(7.0 * t_s)
-    angle, torque = servo(cmd, row_s, late_s)
+    angle, torque = servo(cmd, row_s, late_s, push)
     columns = {"cmd.servo": cmd, "pos.servo": angle, "tau.servo": torque}
     log = make_log(("servo",), t_s, columns)
     friction = {"coulomb_friction": {"torque_nm": Nominal(COULOMB)}}

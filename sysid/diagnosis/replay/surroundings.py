@@ -14,7 +14,7 @@ def surroundings_at(
     mass: Float[Array, "1 c"],
     push_gain: Float[Array, "1 c"],
 ) -> tuple[Surroundings, Float[Array, "p c"]]:
-    """Gravity, neighbours and load: τ_load = push + β ext + m(x) · g.
+    """Gravity, neighbours and load: τ_load = μ push + β ext + m(x) · g.
 
     The moment of the carried masses turns with the joint: m(x) = μ (m cos x + m⊥ sin x)
     for an angle x from the measured one.
@@ -36,7 +36,7 @@ def surroundings_at(
     moment = jnp.cos(away) * now.moment + jnp.sin(away) * now.turned
     moment = mass[..., None] * moment
     gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
-    load = now.push + push_gain * now.ext + jnp.sum(moment * gravity, -1)
+    load = mass * now.push + push_gain * now.ext + jnp.sum(moment * gravity, -1)
     payload_kg = jnp.broadcast_to(track.payload_kg[:, None], away.shape[:-1])
     around = Surroundings(
         others_nm=now.others_nm,

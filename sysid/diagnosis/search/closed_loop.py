@@ -18,6 +18,7 @@ from jaxtyping import Array, Float
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
+from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay import band, command
 from sysid.diagnosis.replay.command import command_path
 from sysid.diagnosis.replay.effects import ENTER, KINDS
@@ -84,9 +85,13 @@ def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
 
 @flax.struct.dataclass
 class _Windows:
-    """The motion in windows side by side, and the mean targets of its substeps."""
+    """The motion at the end and start of steps, in windows side by side, and targets.
+
+    Those are the mean targets of the substeps.
+    """
 
     motion: Motion
+    before: Motion
     target: Float[Array, "w k l c"]
     track: Track
 
@@ -109,7 +114,8 @@ def _simulated(
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
     steps, pieces = track.pos.shape
-    cut = _cut(track, _targets(track, params, dt, substeps, count), window)
+    targets = _targets(track, params, dt, substeps, count)
+    cut = _cut(track, targets, window, dt * substeps)
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
 
@@ -127,17 +133,21 @@ def _simulated(
         return states, moved, qd, x.encoder + moved - q
 
     def step(carry, row):
-        now = with_candidates(row[0])
-        carry = jax.lax.fori_loop(
-            0, substeps, lambda i, c: substep(c, now, row[1][i]), carry
-        )
+        before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]
+
+        def within(i, c):
+            share = (i + 0.5) / substeps
+            now = jax.tree.map(lambda a, b: a + share * (b - a), before, after)
+            return substep(c, now, target[i])
+
+        carry = jax.lax.fori_loop(0, substeps, within, carry)
         return carry, carry[3]
 
-    first = with_candidates(jax.tree.map(lambda v: v[0], cut.motion))
+    first = with_candidates(jax.tree.map(lambda v: v[0], cut.before))
     q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
     states = init_states(chain(first), cut.target[0, 0], q0, dt)
     start = (states, q0, qd0, q0)
-    angles = jax.lax.scan(step, start, (cut.motion, cut.target))[1]
+    angles = jax.lax.scan(step, start, (cut.before, cut.motion, cut.target))[1]
     whole = angles.reshape(window, -1, pieces, count)
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
 
@@ -152,7 +162,9 @@ def _targets(track: Track, params, dt: float, substeps: int, count: int):
     return mean.reshape(-1, substeps, track.pos.shape[1], count)
 
 
-def _cut(track: Track, target: Float[Array, "t k p c"], window: int) -> _Windows:
+def _cut(
+    track: Track, target: Float[Array, "t k p c"], window: int, dt: float
+) -> _Windows:
     """Cuts all along time into windows and lays them side by side."""
     steps = len(track.pos)
     number = -(-steps // window)
@@ -169,5 +181,36 @@ def _cut(track: Track, target: Float[Array, "t k p c"], window: int) -> _Windows
         name: jnp.concatenate([getattr(track, name)] * number)
         for name in ("gravity", "payload_kg", "kp", "kd")
     }
-    motion = jax.tree.map(cut, motion_of(track))
-    return _Windows(motion, beside, replace(track, **constants))
+    motion = motion_of(track)
+    motion = replace(motion, push=_unsmoothed(motion.push))
+    before = jax.tree.map(cut, _before(motion, dt))
+    track = replace(track, **constants)
+    return _Windows(jax.tree.map(cut, motion), before, beside, track)
+
+
+def _unsmoothed(x: Float[Array, "t p"]) -> Float[Array, "t p"]:
+    """Sharpens what is smoothed and then read on straight lines between rows.
+
+    A Gaussian of σ steps and the lines keep e^{−σ²ω²/2} d / ω² of a frequency ω, with
+    d = 2 − 2 cos ω the second difference's; the inverse is 1 + (σ²/2 + 1/12) d + … d².
+    """
+    half = 0.5 * SMOOTH_STEPS**2
+    first, second = half + 1 / 12, half**2 / 2 + half / 6 + 1 / 90
+    bend = _second_difference(x)
+    return x - first * bend + second * _second_difference(bend)
+
+
+def _second_difference(x: Float[Array, "t p"]) -> Float[Array, "t p"]:
+    padded = jnp.concatenate([x[:1], x, x[-1:]])
+    return padded[2:] - 2.0 * x + padded[:-2]
+
+
+def _before(motion: Motion, dt: float) -> Motion:
+    """Returns the motion one step earlier; before the first row, as that moves."""
+    shifted = jax.tree.map(lambda v: jnp.concatenate([v[:1], v[:-1]]), motion)
+    pos, vel, acc = motion.pos[0], motion.vel[0], motion.acc[0]
+    return replace(
+        shifted,
+        pos=shifted.pos.at[0].set(pos - dt * vel + 0.5 * dt**2 * acc),
+        vel=shifted.vel.at[0].set(vel - dt * acc),
+    )

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from support.plain_servo import COULOMB, problem_with
 
+from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.judge import Judge
 
@@ -37,6 +38,25 @@ def test_the_logged_effort_drives_where_the_law_is_unknown():
     assert error(problem, {"stiffness.scale": 2.0}) == pytest.approx(right, rel=1e-4)
     assert error(problem, {"coulomb_friction.torque_nm": 3.0 * COULOMB}) > 2.0 * right
     assert error(problem, {"load_friction.drive_share": 0.98}) > 2.0 * right
+
+
+def test_a_push_from_outside_acts_when_it_does():
+    """That of another joint is known from its rows alone: smoothed, and between them
+    on straight lines."""
+    speed = 2.0 * np.pi * 6.0  # five rows in a third of a period
+    problem = problem_with(push=lambda t_s: 0.5 * np.sin(speed * t_s))
+    track, dt = problem.data.track, problem.data.dt
+    t_s = dt * np.arange(len(track.pos))[:, None] + problem.data.start_s
+    kept = np.exp(-0.5 * (SMOOTH_STEPS * speed * dt) ** 2)
+
+    def pushed(late_s):
+        seen = 0.5 * kept * np.sin(speed * (t_s - late_s))
+        moved = replace(track, push=track.push + seen.astype(np.float32))
+        return error(replace(problem, data=replace(problem.data, track=moved)))
+
+    assert pushed(0.0) < 3e-4
+    assert pushed(0.5 * dt) > 3e-3 and pushed(-0.5 * dt) > 3e-3
+    assert error(problem) > 9e-3
 
 
 def judged(problem, before, after):
