@@ -8,6 +8,7 @@ import runpy
 import subprocess
 import sys
 
+import jax
 import nbformat
 import pytest
 from nbformat import NotebookNode
@@ -30,6 +31,15 @@ def outputs(notebook):
     return [output for cell in code for output in cell.outputs]
 
 
+@pytest.fixture
+def quickly_compiled():
+    """Programs that run for a moment are not worth optimizing."""
+    jax.config.update("jax_disable_most_optimizations", True)
+    yield
+    jax.config.update("jax_disable_most_optimizations", False)
+
+
+@pytest.mark.usefixtures("quickly_compiled")
 @pytest.mark.parametrize("source", SOURCES, ids=named)
 def test_notebooks_run(source, tmp_path, monkeypatch):
     monkeypatch.setenv("NOTEBOOK_FAST", "1")

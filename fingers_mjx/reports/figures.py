@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from envs.hand.nominal import FINGERS
 
@@ -171,6 +172,8 @@ def training_curves(
             points = [(row[x], row[key]) for row in rows if key in row and x in row]
             axes.plot(*np.reshape(points, (-1, 2)).T, color=colour, lw=1.6, label=name)
         axes.set(xlabel="environment steps", ylabel=label)
+        axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+        axes.locator_params(axis="x", nbins=5)
     if len(runs) > 1:
         panels[0].legend()
     return figure
