@@ -206,7 +206,12 @@ def _hand_file(
     """The default hand file with what the model holds in the place of its own."""
     default, note = load_hand_file(), f"of {placed.custom.path.name}"
     scales = {
-        _SCALES[name]: JointQuantity(1.0, "1", "user", note=f"{name} is that {note}")
+        _SCALES[name]: JointQuantity(
+            1.0,
+            "1",
+            "user",
+            note=f"{name} is that {'of the map' if name in drive.mapped else note}",
+        )
         for name in drive.own & set(_SCALES)
     }
     kept = [field for name, field in _SCALES.items() if name not in drive.own]

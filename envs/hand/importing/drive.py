@@ -25,11 +25,13 @@ class ImportedDrive:
             [kg·m²] of each.
         own: which of them are the model's own and not the vendor's nominal ones.
         notes: a sentence for all that was not taken from the model.
+        mapped: which of them the user's map gives in the place of the model's.
     """
 
     values: dict[str, Float[np.ndarray, " joints"]]
     own: frozenset[str]
     notes: tuple[str, ...]
+    mapped: frozenset[str] = frozenset()
 
 
 def drive_of(
@@ -94,7 +96,8 @@ def own_drive_of(
         elif not np.all(values > 0):
             notes += ("no armature on all joints: as the model has it",)
     notes += _friction_note(model, joints)
-    return ImportedDrive(found, frozenset(found), notes)
+    mapped = frozenset(name for name in found if getattr(given, name) is not None)
+    return ImportedDrive(found, frozenset(found), notes, mapped)
 
 
 def _found(

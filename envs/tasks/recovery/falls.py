@@ -91,7 +91,7 @@ def falls_of(hand: HandFile, stance: Stance, held_out: bool = False) -> Falls:
     stored, hand = load_falls(held_out), hand.without_effects
     if hand.sha256 == stored.hand_sha256:
         return stored
-    found, wanted = len(stance.target_rad), stored.target_rad.shape[1]
+    found, wanted = len(stance.target_rad), len(stored.target_rad[0])
     if found != wanted:
         valid = f"a hand of {wanted} joints: the fallen poses are of such a one"
         raise InputError("hand file", "description", f"{found} joints", valid)
