@@ -16,6 +16,8 @@ from envs.hand.importing.own_frames import Hinges, own_link_frames, own_palm_fra
 from envs.hand.importing.palm import Frame
 from envs.hand.importing.place import place
 from envs.hand.model import build_model
+from envs.hand.stance import stance_of
+from envs.hand.stance_search import with_stance
 
 EXAMPLE = Path(__file__).parents[4] / "examples/second_hand"
 MJCF = EXAMPLE / "small_hand.xml"
@@ -161,3 +163,18 @@ def test_what_lacks_may_be_given(tmp_path):
     np.testing.assert_allclose(hand.nominal.per_joint("armature"), 0.002)
     assert hand.torque_scale.note == "force_limit is that of the map"
     assert "lowest of the default" in hand.speed_limit.note
+
+
+def test_three_fingers_stand_too(tmp_path):
+    spec = mujoco.MjSpec.from_file(str(MJCF))
+    for actuator in [a for a in spec.actuators if a.name.startswith("ring")]:
+        spec.delete(actuator)
+    spec.delete(spec.body("ring_base"))
+    spec.compile()
+    path = tmp_path / "hand.xml"
+    path.write_text(spec.to_xml(), "utf-8")
+    fingers = {name: joints for name, joints in FINGERS.items() if name != "ring"}
+    hand = import_hand(path, from_dict(JointMap, {"fingers": fingers}, "map.yaml")).hand
+    stance = stance_of(with_stance(hand, starts=2))
+    assert (len(stance.target_rad), len(stance.footprint_v)) == (9, 3)
+    assert stance.root_pos_w[2] > 0.05
