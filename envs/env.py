@@ -12,7 +12,7 @@ from envs.base import State
 from envs.hand.effect_parts import friction_rows
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.spec import JOINT_QPOS, HandSpec
+from envs.hand.spec import HandSpec
 from envs.hand.stance import Stance, stance_of
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample, flatten, push, start_history
@@ -127,10 +127,10 @@ class HandEnv:
 
     def reset(self, key: PRNGKeyArray) -> State:
         """Begins a new world: its draw of the randomization and its first episode."""
-        config = self.config
+        config, count = self.config, self.action_size
         world = PerWorldState(
             key=key,
-            variation=draw_variation(stream(key, "variation"), config.randomize),
+            variation=draw_variation(stream(key, "variation"), config.randomize, count),
             weights=scheduled_weights(
                 self.table,
                 config.weights,
@@ -148,7 +148,7 @@ class HandEnv:
         world = state.memory.world
         return self._start(world.replace(episodes=world.episodes + 1))
 
-    def step(self, state: State, action: Float[Array, "20"]) -> State:
+    def step(self, state: State, action: Float[Array, " joints"]) -> State:
         """Advances one control step, θ ← clip(θ + α tanh(clip(a, ±c)), joint limits).
 
         Args:
@@ -214,7 +214,7 @@ class HandEnv:
         carried = self.task.begin_episode(key, world, data) | {
             "world": world,
             "steps": jnp.zeros((), jnp.int32),
-            "drive": self.plant.drive.begin(target, data.qpos[JOINT_QPOS]),
+            "drive": self.plant.drive.begin(target, data.qpos[self.spec.joint_qpos]),
             "target": target,
             "action": action,
         }
@@ -239,7 +239,7 @@ class HandEnv:
         self,
         before: PhysicsState,
         output: PhysicsOutput,
-        action: Float[Array, "20"],
+        action: Float[Array, " joints"],
         carried: Mapping[str, Any],
     ) -> Signals:
         """All signals of a control step, s = h(x_t, x_{t+1}, a_t).
@@ -271,7 +271,7 @@ class HandEnv:
         """
         reference, noise = jnp.array(self.stance.joint_pos_rad), self.config.randomize
         effects = self.plant.effects
-        drive, q = self.plant.drive, data.qpos[JOINT_QPOS]
+        drive, q = self.plant.drive, data.qpos[self.spec.joint_qpos]
         joints = drive.reading(carried["drive"], q) - reference
         imu = effects.sense(imu_of(data, effects.down_w))
         sample = sense(noise, carried["world"], joints, imu, carried["action"])

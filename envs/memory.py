@@ -63,8 +63,8 @@ class Memory:
     world: PerWorldState
     steps: Int[Array, "*b"]
     drive: DriveState
-    target: Float[Array, "*b 20"]
-    action: Float[Array, "*b 20"]
+    target: Float[Array, "*b joints"]
+    action: Float[Array, "*b joints"]
     history: Sample
     command: Float[Array, "*b 3"]
     lift: Any = None

@@ -44,10 +44,10 @@ class Sample:
         inputs: the task's inputs by name of their term.
     """
 
-    joint_pos: Float[Array, "*t 20"]
+    joint_pos: Float[Array, "*t joints"]
     gravity: Float[Array, "*t 3"]
     angvel: Float[Array, "*t 3"]
-    action: Float[Array, "*t 20"]
+    action: Float[Array, "*t joints"]
     inputs: dict[str, Float[Array, "*t n"]] = flax.struct.field(default_factory=dict)
 
 

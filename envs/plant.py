@@ -14,7 +14,7 @@ from jaxtyping import Array, Bool, Float
 from envs.hand.drive.drive import Drive, DriveState, make_drive
 from envs.hand.drive.model_effects import SceneEffects, make_scene_effects
 from envs.hand.hand_file import HandFile
-from envs.hand.spec import HAND_NQ, HandSpec, hand_spec
+from envs.hand.spec import HandSpec, hand_spec
 from envs.hand.stance import Stance
 from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
 
@@ -37,7 +37,7 @@ class Plant:
 
     mj_model: mujoco.MjModel
     spec: HandSpec
-    joint_range: Float[Array, "20 2"]
+    joint_range: Float[Array, "joints 2"]
     physics: Physics
     drive: Drive
     stance: Stance
@@ -47,10 +47,10 @@ class Plant:
 
     def next_target(
         self,
-        target: Float[Array, "20"],
-        action: Float[Array, "20"],
+        target: Float[Array, " joints"],
+        action: Float[Array, " joints"],
         scale_rad: float,
-    ) -> Float[Array, "20"]:
+    ) -> Float[Array, " joints"]:
         """Target ← clip(target + α tanh(a), joint limits) [rad].
 
         Args:
@@ -69,7 +69,7 @@ class Plant:
         fields: ModelFields,
         state: PhysicsState,
         drive: DriveState,
-        target: Float[Array, "20"],
+        target: Float[Array, " joints"],
     ) -> tuple[DriveState, PhysicsOutput, Bool[Array, ""]]:
         """Advances one control step with the targets held: s' = f(s, target; fields).
 
@@ -157,7 +157,7 @@ def make_plant(
 def _output_at_rest(model: mujoco.MjModel, stance: Stance) -> PhysicsOutput:
     """The settled stance, the rest of the scene as built, and their sensors."""
     data = mujoco.MjData(model)
-    data.qpos[:HAND_NQ], data.ctrl[:] = stance.qpos, stance.target_rad
+    data.qpos[: len(stance.qpos)], data.ctrl[:] = stance.qpos, stance.target_rad
     mujoco.mj_forward(model, data)
     vectors = (data.qpos, np.zeros(model.nv), np.zeros(model.nv), data.sensordata)
     *state, sensordata = (jnp.asarray(x, jnp.float32) for x in vectors)

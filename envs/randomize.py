@@ -27,8 +27,8 @@ class Variation:
     """One world's draw; units as in `RandomizeConfig`."""
 
     tip_friction: Float[Array, "*b"]
-    stiffness_scale: Float[Array, "*b 20"]
-    damping_scale: Float[Array, "*b 20"]
+    stiffness_scale: Float[Array, "*b joints"]
+    damping_scale: Float[Array, "*b joints"]
     effort_scale: Float[Array, "*b"]
     payload_com_m: Float[Array, "*b 3"]
     payload_mass_scale: Float[Array, "*b"]
@@ -38,7 +38,9 @@ class Variation:
     gyro_bias_rps: Float[Array, "*b 3"]
 
 
-def draw_variation(key: PRNGKeyArray, config: RandomizeConfig) -> Variation:
+def draw_variation(
+    key: PRNGKeyArray, config: RandomizeConfig, joints: int
+) -> Variation:
     """Draws one world: x = U(low, high) for each quantity [rad, m, 1].
 
     Each quantity has a stream of its own, so that a new one leaves the others as they
@@ -47,6 +49,7 @@ def draw_variation(key: PRNGKeyArray, config: RandomizeConfig) -> Variation:
     Args:
         key: of the draw.
         config: the ranges.
+        joints: joints of the hand.
 
     Source:
         Paper, domain randomization (friction, gains, effort, payload); palm, IMU and
@@ -63,8 +66,8 @@ def draw_variation(key: PRNGKeyArray, config: RandomizeConfig) -> Variation:
     along, away = config.payload_com_m
     return Variation(
         tip_friction=uniform("tip_friction", (), *config.tip_friction),
-        stiffness_scale=uniform("stiffness_scale", (20,), *config.gain_scale),
-        damping_scale=uniform("damping_scale", (20,), *config.gain_scale),
+        stiffness_scale=uniform("stiffness_scale", (joints,), *config.gain_scale),
+        damping_scale=uniform("damping_scale", (joints,), *config.gain_scale),
         effort_scale=uniform("effort_scale", (), *config.effort_scale),
         # The palm's x is normal to its back.
         payload_com_m=within("payload_com", [away, along, along]),

@@ -30,9 +30,9 @@ def imu_of(data: PhysicsState, down_w: Float[Array, "3"]) -> Imu:
 def sense(
     config: RandomizeConfig,
     world: PerWorldState,
-    joint_pos: Float[Array, "20"],
+    joint_pos: Float[Array, " joints"],
     imu: Imu,
-    action: Float[Array, "20"],
+    action: Float[Array, " joints"],
 ) -> Sample:
     """What the actor observes of one control step, without the task's inputs.
 

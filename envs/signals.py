@@ -10,15 +10,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float, Shaped
 
 from envs.hand.model import PALM, PAYLOAD, V_SITE
-from envs.hand.nominal import vendor_hand
-from envs.hand.spec import (
-    JOINT_QPOS,
-    JOINT_QVEL,
-    OTHER_LINKS,
-    TIP_SITES,
-    TIP_SPHERES,
-    HandSpec,
-)
+from envs.hand.spec import HandSpec
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.rotations import multiply, rotate, unrotate
 from rewards import safe_norm
@@ -54,27 +46,27 @@ class Signals:
         extra: the task's own signals by name, see `envs.task.HandTask`.
     """
 
-    joint_pos: Float[Array, "*b 20"]
-    joint_vel: Float[Array, "*b 20"]
-    joint_acc: Float[Array, "*b 20"]
-    torque_nm: Float[Array, "*b 20"]
+    joint_pos: Float[Array, "*b joints"]
+    joint_vel: Float[Array, "*b joints"]
+    joint_acc: Float[Array, "*b joints"]
+    torque_nm: Float[Array, "*b joints"]
     palm_pos_w: Float[Array, "*b 3"]
     palm_quat_w: Float[Array, "*b 4"]
     gravity_b: Float[Array, "*b 3"]
     angvel_b: Float[Array, "*b 3"]
     vel_v: Float[Array, "*b 3"]
     angvel_v: Float[Array, "*b 3"]
-    tip_pos_v: Float[Array, "*b 5 3"]
-    tip_vel_v: Float[Array, "*b 5 3"]
-    tip_vel_w: Float[Array, "*b 5 3"]
-    tip_force_n: Float[Array, "*b 5"]
-    pad_tilt_rad: Float[Array, "*b 5"]
+    tip_pos_v: Float[Array, "*b tips 3"]
+    tip_vel_v: Float[Array, "*b tips 3"]
+    tip_vel_w: Float[Array, "*b tips 3"]
+    tip_force_n: Float[Array, "*b tips"]
+    pad_tilt_rad: Float[Array, "*b tips"]
     link_contact: Float[Array, "*b links"]
     palm_contact: Float[Array, "*b"]
     tilt_rad: Float[Array, "*b 2"]
     command: Float[Array, "*b 3"]
-    action: Float[Array, "*b 20"]
-    previous_action: Float[Array, "*b 20"]
+    action: Float[Array, "*b joints"]
+    previous_action: Float[Array, "*b joints"]
     extra: dict[str, Shaped[Array, "..."]] = flax.struct.field(default_factory=dict)
 
 
@@ -89,8 +81,8 @@ class Command:
     """
 
     command: Float[Array, "*b 3"]
-    action: Float[Array, "*b 20"]
-    previous_action: Float[Array, "*b 20"]
+    action: Float[Array, "*b joints"]
+    previous_action: Float[Array, "*b joints"]
 
 
 def extract_signals(
@@ -126,12 +118,12 @@ def extract_signals(
     """
     state, sensors = output.state, output.sensordata
     quat_w, angvel_b = state.qpos[3:7], state.qvel[3:6]
-    v_quat_w, joint_vel = multiply(quat_w, q_off), state.qvel[JOINT_QVEL]
+    v_quat_w, joint_vel = multiply(quat_w, q_off), state.qvel[spec.joint_qvel]
     return Signals(
-        joint_pos=state.qpos[JOINT_QPOS],
+        joint_pos=state.qpos[spec.joint_qpos],
         joint_vel=joint_vel,
-        joint_acc=(joint_vel - before.qvel[JOINT_QVEL]) / dt_s,
-        torque_nm=_stack(spec, sensors, "torque", vendor_hand().joint_names)[:, 0],
+        joint_acc=(joint_vel - before.qvel[spec.joint_qvel]) / dt_s,
+        torque_nm=_stack(spec, sensors, "torque", spec.joints)[:, 0],
         palm_pos_w=state.qpos[:3],
         palm_quat_w=quat_w,
         gravity_b=gravity(quat_w),
@@ -140,7 +132,7 @@ def extract_signals(
         angvel_v=unrotate(q_off, angvel_b),
         **_tip_signals(spec, sensors),
         tip_force_n=_tip_force(spec, sensors),
-        link_contact=_touching(spec, sensors, OTHER_LINKS),
+        link_contact=_touching(spec, sensors, spec.other_links),
         palm_contact=jnp.max(_touching(spec, sensors, (PALM, PAYLOAD))),
         tilt_rad=tilt(v_quat_w),
         **vars(asked),
@@ -195,18 +187,18 @@ def tilt_from_level(gravity_v: Float[Array, "3"]) -> Float[Array, ""]:
 def _tip_signals(
     spec: HandSpec, sensors: Float[Array, " n"]
 ) -> dict[str, Float[Array, "..."]]:
-    """Positions, velocities and pad tilts of the five tips."""
+    """Positions, velocities and pad tilts of the tips."""
     base_pos, base_quat, base_vel, base_angvel = (
         spec.read(sensors, f"{kind}_{V_SITE}")
         for kind in ("pos", "quat", "linvel", "angvel")
     )
-    pos_w = _stack(spec, sensors, "pos", TIP_SITES)
-    vel_w = _stack(spec, sensors, "linvel", TIP_SITES)
+    pos_w = _stack(spec, sensors, "pos", spec.tip_sites)
+    vel_w = _stack(spec, sensors, "linvel", spec.tip_sites)
     offset_w = pos_w - base_pos
     relative_w = vel_w - base_vel - jnp.cross(base_angvel, offset_w)
     to_v = jax.vmap(lambda x: unrotate(base_quat, x))
     pad_w = jax.vmap(lambda quat: rotate(quat, jnp.array([1.0, 0.0, 0.0])))(
-        _stack(spec, sensors, "quat", TIP_SITES)
+        _stack(spec, sensors, "quat", spec.tip_sites)
     )
     return {
         "tip_pos_v": to_v(offset_w),
@@ -216,9 +208,9 @@ def _tip_signals(
     }
 
 
-def _tip_force(spec: HandSpec, sensors: Float[Array, " n"]) -> Float[Array, "5"]:
+def _tip_force(spec: HandSpec, sensors: Float[Array, " n"]) -> Float[Array, " tips"]:
     """Magnitude of the floor's force on each tip [N]."""
-    force = _stack(spec, sensors, "force", TIP_SPHERES)
+    force = _stack(spec, sensors, "force", spec.tip_spheres)
     return jnp.sqrt(jnp.sum(force**2, axis=-1))
 
 

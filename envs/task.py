@@ -72,7 +72,7 @@ class HandTask(ABC):
     @abstractmethod
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+    ) -> tuple[PhysicsState, Float[Array, " joints"]]:
         """First state, x_0 = f(key), of an episode, and the joint targets held in it.
 
         Args:
@@ -112,8 +112,8 @@ class HandTask(ABC):
         return {"command": carried["command"]}
 
     def override(
-        self, plant: Plant, memory: Memory, action: Float[Array, "20"]
-    ) -> tuple[Memory, Float[Array, "20"]]:
+        self, plant: Plant, memory: Memory, action: Float[Array, " joints"]
+    ) -> tuple[Memory, Float[Array, " joints"]]:
         """What is done in the place of the policy's output a: a ← a.
 
         Args:

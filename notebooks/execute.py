@@ -70,7 +70,11 @@ def execute(source: Path) -> NotebookNode:
     with tempfile.TemporaryDirectory() as folder:
         resources = {"metadata": {"path": folder}}
         client = NotebookClient(
-            notebook, timeout=CELL_TIMEOUT_S, kernel_name="python3", resources=resources
+            notebook,
+            timeout=CELL_TIMEOUT_S,
+            kernel_name="python3",
+            resources=resources,
+            coalesce_streams=True,  # so that progress is one line
         )
         client.execute()
         return cleaned(notebook, [folder, str(HERE.parent)])

@@ -18,7 +18,8 @@ from envs.errors import InputError, one_of
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.importing.files import check_files
 from envs.hand.model import build_spec
-from envs.hand.nominal import FINGERS, vendor_hand
+from envs.hand.nominal import NominalHand
+from envs.hand.places import places
 from envs.physics.quiet_mujoco import mujoco
 from sysid.drive import DriveFile, JointDrive, Nominal
 from sysid.passive import with_passive
@@ -107,7 +108,7 @@ def hand_mechanism(hand: HandFile | None = None) -> Mechanism:
         link.joint: _hand_drive(hand, index)
         for index, link in enumerate(hand.nominal.links)
     }
-    return Mechanism(model, drives, _hand_classes(), hand)
+    return Mechanism(model, drives, _hand_classes(hand.nominal), hand)
 
 
 def joint_range(mechanism: Mechanism, joint: str) -> tuple[float, float]:
@@ -163,33 +164,23 @@ def joint_address(
 def _hand_drive(hand: HandFile, index: int) -> JointDrive:
     """Drive of one joint of the hand."""
     link = hand.nominal.links[index]
-    limit = link.force_limit * hand.torque_scale.per_joint()[index]
+    limit = link.force_limit * hand.per_joint("torque_scale")[index]
     return JointDrive(
-        kp=Nominal(link.kp * hand.stiffness_scale.per_joint()[index]),
-        kd=Nominal(link.kv * hand.damping_scale.per_joint()[index], 0.1),
+        kp=Nominal(link.kp * hand.per_joint("stiffness_scale")[index]),
+        kd=Nominal(link.kv * hand.per_joint("damping_scale")[index], 0.1),
         effects={
             "transport_delay": {"delay_s": Nominal(hand.delay_s.value)},
             "lowpass_cutoff": {"cutoff_hz": Nominal(hand.lowpass_hz.value)},
             "slew_limit": {
-                "speed_rad_s": Nominal(float(hand.speed_limit.per_joint()[index]))
+                "speed_rad_s": Nominal(float(hand.per_joint("speed_limit")[index]))
             },
             "torque_limit": {"limit_nm": Nominal(float(limit))},
         },
     )
 
 
-def _hand_classes() -> dict[str, tuple[str, ...]]:
-    """Joints of the hand by kind and by finger; joint 2 of a finger abducts."""
-    names = vendor_hand().joint_names
-    by_number = {
-        i: tuple(n for n in names if n.endswith(f"joint{i}")) for i in range(5)
-    }
-    classes = {
-        "flexion": tuple(n for n in names if not n.endswith("joint2")),
-        "abduction": by_number[2],
-        "pip": by_number[3],
-        "dip": by_number[4],
-    }
-    for index, finger in enumerate(FINGERS):
-        classes[finger] = names[4 * index : 4 * index + 4]
-    return classes
+def _hand_classes(hand: NominalHand) -> dict[str, tuple[str, ...]]:
+    """Joints of the hand by kind and by finger."""
+    known = places(hand)
+    kinds = ("flexion", "abduction", "pip", "dip", *hand.fingers)
+    return {name: known[name] for name in kinds}

@@ -1,13 +1,10 @@
 """The notebooks: their text runs, and what is committed of them is made of it."""
 
 import base64
-import json
-import os
 import re
 import runpy
-import subprocess
-import sys
 
+import jax
 import nbformat
 import pytest
 from nbformat import NotebookNode
@@ -17,12 +14,20 @@ from notebooks.execute import SOURCES, cells_of, cleaned, main
 
 PLACES = re.compile(r"/(work|tmp|home|root)/|localhost", re.IGNORECASE)
 FOLDER = SOURCES[0].parent
-LONG = FOLDER / "from_log_to_policy.ipynb"
 MOST_BYTES = 400_000
+LONG = ("5_hidden_effect",)
+"""A diagnosis takes a minute, however little else is done."""
 
 
 def named(path):
     return path.stem
+
+
+def marked(path):
+    return [pytest.mark.slow] if path.stem in LONG else []
+
+
+RUN = [pytest.param(path, marks=marked(path), id=path.stem) for path in SOURCES]
 
 
 def outputs(notebook):
@@ -30,7 +35,16 @@ def outputs(notebook):
     return [output for cell in code for output in cell.outputs]
 
 
-@pytest.mark.parametrize("source", SOURCES, ids=named)
+@pytest.fixture
+def quickly_compiled():
+    """Programs that run for a moment are not worth optimizing."""
+    jax.config.update("jax_disable_most_optimizations", True)
+    yield
+    jax.config.update("jax_disable_most_optimizations", False)
+
+
+@pytest.mark.usefixtures("quickly_compiled")
+@pytest.mark.parametrize("source", RUN)
 def test_notebooks_run(source, tmp_path, monkeypatch):
     monkeypatch.setenv("NOTEBOOK_FAST", "1")
     monkeypatch.chdir(tmp_path)
@@ -84,25 +98,3 @@ def test_outputs_lose_what_belongs_to_one_machine():
     assert made.metadata == {}
     assert [o.get("text") for o in made.outputs] == ["100 %\nin z\n", None]
     assert set(made.outputs[1].data) == {"image/png"}
-
-
-def long_code():
-    """The code cells of the long notebook, one after the other."""
-    cells = json.loads(LONG.read_text(encoding="utf-8"))["cells"]
-    return "\n".join("".join(c["source"]) for c in cells if c["cell_type"] == "code")
-
-
-def test_the_long_notebook_is_committed_without_outputs():
-    cells = json.loads(LONG.read_text(encoding="utf-8"))["cells"]
-    assert all(not cell.get("outputs") for cell in cells)
-    compile(long_code(), str(LONG), "exec")
-
-
-@pytest.mark.slow
-def test_the_long_notebook_runs(tmp_path):
-    (tmp_path / "cells.py").write_text(long_code(), encoding="utf-8")
-    few = {"NOTEBOOK_SECONDS": "30", "NOTEBOOK_EPISODES": "2"}
-    few["NOTEBOOK_OUT"] = str(tmp_path / "out")
-    subprocess.run(
-        [sys.executable, "cells.py"], cwd=tmp_path, env=os.environ | few, check=True
-    )

@@ -49,7 +49,7 @@ def write_model(path: Path) -> Path:
 
 
 def _joint_speeds() -> tuple[float, ...]:
-    return tuple(load_hand_file().speed_limit.per_joint().tolist())
+    return tuple(load_hand_file().per_joint("speed_limit").tolist())
 
 
 def hand_interface() -> Interface:

@@ -29,7 +29,7 @@ class ActionTransform:
         """Returns a_t = min(max(a, −c), c), within ±c; NaN stays NaN.
 
         Args:
-            action: policy output [1], [20].
+            action: policy output [1], [n].
 
         Source:
             Ours: the bound of training (`docs/reference/crawl.md`, Action).
@@ -40,7 +40,7 @@ class ActionTransform:
         """Returns min(max(target, low), high), within the limits; NaN stays NaN.
 
         Args:
-            target_rad: joint targets [rad], [20].
+            target_rad: joint targets [rad], [n].
 
         Source:
             Ours: the limits of training (`docs/reference/crawl.md`, Action).
@@ -51,11 +51,11 @@ class ActionTransform:
         """Returns clip(target + α·tanh(clip(a, ±c))): finite, within the limits.
 
         Args:
-            target_rad: the target so far [rad], [20].
-            action: policy output a [1], clipped or not, [20].
+            target_rad: the target so far [rad], [n].
+            action: policy output a [1], clipped or not, [n].
 
         Returns:
-            The next target [rad], [20].
+            The next target [rad], [n].
 
         Raises:
             ValueError: another shape, or a NaN or an infinity in an argument; what to

@@ -98,7 +98,7 @@ def check_parity(bundle: Bundle, policy) -> None:
 
     Args:
         bundle: the bundle with the answers.
-        policy: maps an observation [N] to an action [20], both float32.
+        policy: maps an observation [N] to an action [n], both float32.
 
     Raises:
         BundleError: the policy does not give these answers.

@@ -8,7 +8,6 @@ from fingers_deploy.errors import BundleError, one_of
 from fingers_deploy.manifest import (
     ACTION_TRANSFORM,
     HISTORY_ORDER,
-    JOINT_COUNT,
     SCHEMA_VERSION,
     Interface,
     Manifest,
@@ -17,12 +16,12 @@ from fingers_deploy.manifest import (
 from fingers_deploy.strict_json import from_json, load_json
 
 # Size, frame and unit of every term that can be put together here. None: free, because
-# the caller supplies the command as the manifest describes it.
+# the caller supplies the command as the manifest describes it; of joints, one each.
 TERM_FRAMES: dict[str, tuple[int | None, str | None, str | None]] = {
-    "joint_pos": (JOINT_COUNT, "joint", "rad"),
+    "joint_pos": (None, "joint", "rad"),
     "gravity_b": (3, "palm", "1"),
     "angvel_b": (3, "palm", "rad/s"),
-    "previous_action": (JOINT_COUNT, "joint", "1"),
+    "previous_action": (None, "joint", "1"),
     "command": (None, None, None),
     "request": (4, None, "1"),
     "fingertip_pos": (3, "V", "m"),
@@ -33,7 +32,7 @@ TERM_FRAMES: dict[str, tuple[int | None, str | None, str | None]] = {
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 _VERSION = re.compile(r"[A-Za-z0-9.+_-]{1,64}")
 _SHA256 = re.compile(r"[0-9a-f]{64}")
-_MAX_HISTORY = 1000
+_MAX_HISTORY, _MAX_JOINTS = 1000, 100
 _UNIT_TOLERANCE = 1e-4
 _ROUNDING_RAD = 1e-6  # a target clipped in float32 may lie this far outside
 
@@ -96,11 +95,13 @@ def _check_head(manifest: Manifest, problem: _Problems) -> None:
 
 def _check_joints(interface: Interface, problem: _Problems) -> None:
     names, limits = interface.joint_names, interface.joint_limits_rad
-    for field in ("joint_names", "reference_angles_rad", "joint_limits_rad"):
+    field, valid = "interface.joint_names", f"1 to {_MAX_JOINTS} entries"
+    known = 1 <= len(names) <= _MAX_JOINTS
+    problem.unless(known, field, f"{len(names)} entries", valid)
+    for field in ("reference_angles_rad", "joint_limits_rad", "initial_target_rad"):
         count = len(getattr(interface, field))
-        problem.length(f"interface.{field}", count, JOINT_COUNT)
+        problem.length(f"interface.{field}", count, len(names))
     target = interface.initial_target_rad
-    problem.length("interface.initial_target_rad", len(target), JOINT_COUNT)
     for i, name in enumerate(names):
         field = f"interface.joint_names[{i}]"
         problem.unless(bool(_NAME.fullmatch(name)), field, name, "an identifier")
@@ -123,7 +124,7 @@ def _check_terms(interface: Interface, problem: _Problems) -> None:
     )
     problem.unless(bool(names), f"{field}.terms", "no term", "at least one term")
     for i, term in enumerate(observation.terms):
-        _check_term(f"{field}.terms[{i}]", term, problem)
+        _check_term(f"{field}.terms[{i}]", term, len(interface.joint_names), problem)
         problem.unless(
             term.name not in names[:i],
             f"{field}.terms[{i}].name",
@@ -138,11 +139,12 @@ def _check_terms(interface: Interface, problem: _Problems) -> None:
         problem.unless(low <= high, where, [low, high], "lowest before highest")
 
 
-def _check_term(field: str, term: Term, problem: _Problems) -> None:
+def _check_term(field: str, term: Term, joints: int, problem: _Problems) -> None:
     known = term.name in TERM_FRAMES
     valid = one_of(TERM_FRAMES, term.name)
     problem.unless(known, f"{field}.name", term.name, valid)
     size, frame, unit = TERM_FRAMES[term.name]
+    size = joints if frame == "joint" else size
     problem.unless(
         term.size == size if size else 0 < term.size <= 1000,
         f"{field}.size",
@@ -169,8 +171,8 @@ def _check_rates(interface: Interface, problem: _Problems) -> None:
     for field, value in positive.items():
         holds = value is None or value > 0
         problem.unless(holds, f"interface.{field}", value, "above zero")
-    slews = path.slews_rad_s
-    problem.length("interface.command_path.slew_rad_s", len(slews), JOINT_COUNT)
+    slews, joints = interface.slews_rad_s, len(interface.joint_names)
+    problem.length("interface.command_path.slew_rad_s", len(slews), joints)
     for i, slew in enumerate(slews):
         field = f"interface.command_path.slew_rad_s[{i}]"
         problem.unless(slew > 0, field, slew, "above zero")
@@ -193,8 +195,8 @@ def _check_sizes(manifest: Manifest, problem: _Problems) -> None:
     found = policy.obs_size
     valid = f"{total}, the sum over the observation terms"
     problem.unless(found == total, "policy.obs_size", found, valid)
-    found = policy.action_size
-    problem.unless(found == JOINT_COUNT, "policy.action_size", found, f"{JOINT_COUNT}")
+    found, joints = policy.action_size, len(manifest.interface.joint_names)
+    problem.unless(found == joints, "policy.action_size", found, f"{joints}")
     problem.unless(bool(parity.obs), "parity.obs", "no row", "at least one row")
     problem.length("parity.action", len(parity.action), len(parity.obs))
     for i, row in enumerate(parity.obs):

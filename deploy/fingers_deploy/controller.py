@@ -44,7 +44,7 @@ class PolicyController:
         """Starts an episode; the next sample fills the whole history.
 
         Args:
-            target_rad: targets to go on from, e.g. the measured pose [rad], [20]; the
+            target_rad: targets to go on from, e.g. the measured pose [rad], [n]; the
                 initial target of the training when left out. a_{t−1} = 0.
 
         Raises:
@@ -70,8 +70,8 @@ class PolicyController:
 
         Args:
             history: observation history up to the last control step.
-            action: clipped policy output a_{t−1} = clip(a, ±c) of that step [1], [20].
-            target_rad: targets on the wire [rad], [20].
+            action: clipped policy output a_{t−1} = clip(a, ±c) of that step [1], [n].
+            target_rad: targets on the wire [rad], [n].
 
         Raises:
             ValueError: targets of another shape or not finite.
@@ -90,13 +90,13 @@ class PolicyController:
         angvel_b: ArrayLike,
         command: ArrayLike,
     ) -> Array:
-        """Returns the joint targets [rad] of this control step, [20].
+        """Returns the joint targets [rad] of this control step, [n].
 
         target ← clip(target + α·tanh(π(o))), with the policy π and the observation o of
         `ObservationAssembler`.
 
         Args:
-            joint_pos: measured joint angles [rad], in the manifest's joint order, [20].
+            joint_pos: measured joint angles [rad], in the manifest's joint order, [n].
             gravity_b: unit vector of gravity (points down) in the palm frame, [3].
             angvel_b: angular velocity of the palm in the palm frame [rad/s], [3].
             command: task inputs as the manifest describes them, crawl: [3].

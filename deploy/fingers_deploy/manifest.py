@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any
 
 SCHEMA_VERSION = 1
-JOINT_COUNT = 20
 HISTORY_ORDER = "oldest_first_term_major"
 ACTION_TRANSFORM = "target += alpha*tanh(clip(a))"
 
@@ -103,14 +102,6 @@ class CommandPath:
     lowpass_hz: float | None
     slew_rad_s: tuple[float, ...] | float | None
 
-    @property
-    def slews_rad_s(self) -> tuple[float, ...]:
-        """Limit of each joint [rad/s], infinity without one, [20]."""
-        if isinstance(self.slew_rad_s, tuple):
-            return self.slew_rad_s
-        limit = math.inf if self.slew_rad_s is None else self.slew_rad_s
-        return (limit,) * JOINT_COUNT
-
 
 @dataclass(frozen=True)
 class Interface:
@@ -140,6 +131,14 @@ class Interface:
     command_path: CommandPath
     command_ranges: tuple[tuple[float, float], ...]
     v_quat_b: tuple[float, float, float, float]
+
+    @property
+    def slews_rad_s(self) -> tuple[float, ...]:
+        """Limit of each joint's command [rad/s], infinity without one, [n]."""
+        slew = self.command_path.slew_rad_s
+        if isinstance(slew, tuple):
+            return slew
+        return (math.inf if slew is None else slew,) * len(self.joint_names)
 
 
 @dataclass(frozen=True)

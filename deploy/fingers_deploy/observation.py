@@ -52,10 +52,10 @@ class ObservationAssembler:
         o_i = scale_i · x_i; of the joint angles the reference is subtracted before.
 
         Args:
-            joint_pos: measured joint angles [rad], in the manifest's joint order, [20].
+            joint_pos: measured joint angles [rad], in the manifest's joint order, [n].
             gravity_b: unit vector of gravity (points down) in the palm frame, [3].
             angvel_b: angular velocity of the palm in the palm frame [rad/s], [3].
-            previous_action: clipped policy output of the step before [1], [20].
+            previous_action: clipped policy output of the step before [1], [n].
             command: all task inputs one after another as the manifest's terms
                 describe them, e.g. v_x, v_y [m/s] and yaw rate [rad/s] in V, [3].
 

@@ -6,6 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+JOINT_COUNT = 20
+"""Of the hand that this side is made for; the shim takes any number."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -227,7 +227,7 @@ def test_a_speed_limit_may_be_one_number_one_per_joint_or_none(table):
     each = [2.8] * 12 + [2.5] * 8
     for value, wanted in ((2.5, [2.5] * 20), (each, each), (None, [np.inf] * 20)):
         read = parse_manifest(_edit(table, field, value), "manifest.json")
-        assert list(read.interface.command_path.slews_rad_s) == wanted
+        assert list(read.interface.slews_rad_s) == wanted
         assert parse_manifest(dump_manifest(read), "again") == read
 
 

@@ -5,7 +5,6 @@ import mujoco
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import EffectKind, Stage
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import FINGERS, vendor_hand
 
 SLIGHT_FRICTION_NM = 1e-6
 """A friction that is there, so that a world may have more: MJX plans its constraints
@@ -38,12 +37,12 @@ def add_effect_parts(spec: mujoco.MjSpec, hand: HandFile, floor: str) -> None:
     """
     kinds = kinds_of(hand)
     if any(Stage.FRICTION in kind.acts for kind in kinds):
-        for name in vendor_hand().joint_names:
+        for name in hand.nominal.joint_names:
             spec.joint(name).frictionloss = SLIGHT_FRICTION_NM
     if any(kind.uses_load for kind in kinds):
-        _add_load_sensors(spec)
+        _add_load_sensors(spec, hand)
     if any(kind.name == "friction_anisotropy" for kind in kinds):
-        _add_pairs(spec, floor)
+        _add_pairs(spec, hand, floor)
 
 
 def friction_rows(model: mujoco.MjModel) -> int:
@@ -51,9 +50,9 @@ def friction_rows(model: mujoco.MjModel) -> int:
     return int((model.dof_frictionloss > 0.0).sum())
 
 
-def _add_load_sensors(spec: mujoco.MjSpec) -> None:
+def _add_load_sensors(spec: mujoco.MjSpec, hand: HandFile) -> None:
     """Adds the torque between each link and its parent, in the frame of the joint."""
-    for link in vendor_hand().links:
+    for link in hand.nominal.links:
         spec.body(link.body).add_site(name=load_sensor(link.joint))
         spec.add_sensor(
             name=load_sensor(link.joint),
@@ -63,10 +62,10 @@ def _add_load_sensors(spec: mujoco.MjSpec) -> None:
         )
 
 
-def _add_pairs(spec: mujoco.MjSpec, floor: str) -> None:
+def _add_pairs(spec: mujoco.MjSpec, hand: HandFile, floor: str) -> None:
     """Puts explicit pairs in the place of the contacts of fingertips and floor."""
-    tips = [link for link in vendor_hand().links if link.tip]
-    for finger, link in zip(FINGERS, tips, strict=True):
+    nominal = hand.nominal
+    for finger, link in zip(nominal.fingers, nominal.tip_links, strict=True):
         sphere = spec.geom(f"{link.body}_tip")
         sphere.conaffinity = 0
         slide, spin, roll = sphere.friction

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.config.atomic_file import write_atomic
@@ -21,7 +22,7 @@ from envs.config.typed import dump_yaml, limits, load_yaml, to_dict
 from envs.errors import InputError, one_of
 from envs.hand.nominal import NominalHand, vendor_hand
 from envs.hand.places import fingers_at, joints_at
-from envs.hand.quantity import JointQuantity, Quantity, Vector, numbers
+from envs.hand.quantity import JointQuantity, Quantity, Vector, check_interval, numbers
 
 SCHEMA = 1
 DEFAULT_HAND_FILE = Path(__file__).with_name("hand.yaml")
@@ -52,6 +53,27 @@ class Effect:
 
 
 @dataclass(frozen=True)
+class StanceStart:
+    """Where the settling of a hand's own stance begins.
+
+    Attributes:
+        target_rad: joint targets to hold [rad].
+        qpos: palm position [m] and orientation, w x y z, then joint angles [rad].
+    """
+
+    target_rad: tuple[float, ...] = field(metadata=limits("rad", -6.3, 6.3))
+    qpos: tuple[float, ...] = field(metadata=limits("m, 1, rad", -6.3, 6.3))
+
+    def check(self, joints: int) -> None:
+        """Refuses numbers of another hand."""
+        for name, count in (("target_rad", joints), ("qpos", 7 + joints)):
+            found = len(getattr(self, name))
+            if found != count:
+                where, valid = f"stance.{name}", f"{count} numbers"
+                raise InputError("hand file", where, f"{found} numbers", valid)
+
+
+@dataclass(frozen=True)
 class HandFile:
     """One hand; the metadata of each field is its unit and the range it may take."""
 
@@ -72,16 +94,22 @@ class HandFile:
     link_friction: Quantity = field(metadata=limits("1", 0.0, 10.0))
     effects: tuple[Effect, ...] = ()
     description: NominalHand | None = None
+    stance: StanceStart | None = None
 
     def __post_init__(self) -> None:
         if self.schema != SCHEMA:
             raise InputError("hand file", "schema", self.schema, f"{SCHEMA}")
+        joints = self.nominal.joint_names
         for item in dataclasses.fields(self):
             if "unit" in item.metadata:
-                _check_limits(item.name, getattr(self, item.name), item.metadata)
+                quantity = getattr(self, item.name)
+                _check_joints(item.name, quantity, joints)
+                _check_limits(item.name, quantity, item.metadata, joints)
         for index, effect in enumerate(self.effects):
-            _check_effect(f"effects.{index}", effect)
-        _check_places(self.effects)
+            _check_effect(f"effects.{index}", effect, self.nominal)
+        _check_places(self.effects, self.nominal)
+        if self.stance:
+            self.stance.check(len(joints))
 
     @property
     def nominal(self) -> NominalHand:
@@ -93,12 +121,24 @@ class HandFile:
         """The hand without effects, which stance and starts are made for."""
         return dataclasses.replace(self, effects=())
 
+    def per_joint(self, field: str) -> Float[np.ndarray, " joints"]:
+        """A field's values x_j in joint order, as `per_joint("speed_limit")` [rad/s].
+
+        Args:
+            field: of those that are one number per joint, in the unit it states.
+
+        Source:
+            See `JointQuantity.per_joint`.
+        """
+        return getattr(self, field).per_joint(self.nominal.joint_names)
+
     @property
     def sha256(self) -> str:
         """Digest of the contents; layout and comments of the file do not enter."""
         data = to_dict(self)
-        if self.description is None:  # as files without the field always were
-            del data["description"]
+        for name in ("description", "stance"):  # as files without them always were
+            if getattr(self, name) is None:
+                del data[name]
         text = json.dumps(data, sort_keys=True, separators=(",", ":"))
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -136,17 +176,28 @@ def _without_empty(data: Any) -> Any:
     return [_without_empty(v) for v in data] if isinstance(data, list) else data
 
 
-def _check_limits(name: str, quantity: Any, meta: Mapping[str, Any]) -> None:
+def _check_joints(name: str, quantity: Any, joints: tuple[str, ...]) -> None:
+    """Refuses numbers of other joints, and values outside their own interval."""
+    try:
+        check_interval(quantity, joints)
+    except InputError as error:
+        where = f"{name}.{error.field}"
+        raise InputError(error.source, where, error.found, error.valid) from error
+
+
+def _check_limits(
+    name: str, quantity: Any, meta: Mapping[str, Any], joints: tuple[str, ...] = ()
+) -> None:
     """Refuses another unit than the field's and numbers outside its range."""
     if quantity.unit != meta["unit"]:
         raise InputError("hand file", f"{name}.unit", quantity.unit, meta["unit"])
-    value = numbers(quantity, "value")
+    value = numbers(quantity, "value", joints)
     if np.any(value < meta["low"]) or np.any(value > meta["high"]):
         valid = f"{meta['low']:g} to {meta['high']:g} [{meta['unit']}]"
         raise InputError("hand file", f"{name}.value", quantity.value, valid)
 
 
-def _check_effect(name: str, effect: Effect) -> None:
+def _check_effect(name: str, effect: Effect, hand: NominalHand) -> None:
     """Refuses effects, parameters, units and places that the catalogue has not."""
     if effect.name not in EFFECTS:
         valid = one_of(EFFECTS, effect.name)
@@ -159,23 +210,24 @@ def _check_effect(name: str, effect: Effect) -> None:
     for key, parameter in CATALOGUE[effect.name].parameters.items():
         within = limits(parameter.unit, parameter.low, parameter.high)
         _check_limits(f"{name}.parameters.{key}", effect.parameters[key], within)
-    _check_where(name, effect)
+    _check_where(name, effect, hand)
 
 
-def _check_where(name: str, effect: Effect) -> None:
+def _check_where(name: str, effect: Effect, hand: NominalHand) -> None:
     """Refuses places that the effect cannot have, and a wrong or missing partner."""
     scope = CATALOGUE[effect.name].scope
     if scope == "hand" and effect.where != ("all",):
         valid = "[all], for an effect of the whole hand"
         raise InputError("hand file", f"{name}.where", list(effect.where), valid)
-    at = fingers_at(effect.where) if scope == "finger" else joints_at(effect.where)
+    find = fingers_at if scope == "finger" else joints_at
+    at = find(hand, effect.where)
     if not at:
         raise InputError("hand file", f"{name}.where", "[]", "at least one place")
     if effect.name == "joint_coupling":
-        if effect.other not in vendor_hand().joint_names:
-            valid = one_of(vendor_hand().joint_names, effect.other)
+        if effect.other not in hand.joint_names:
+            valid = one_of(hand.joint_names, effect.other)
             raise InputError("hand file", f"{name}.other", effect.other, valid)
-        if joints_at((effect.other,))[0] in at:
+        if joints_at(hand, (effect.other,))[0] in at:
             valid = "a joint that the effect does not act on"
             raise InputError("hand file", f"{name}.other", effect.other, valid)
     elif effect.other:
@@ -183,13 +235,13 @@ def _check_where(name: str, effect: Effect) -> None:
         raise InputError("hand file", f"{name}.other", effect.other, valid)
 
 
-def _check_places(effects: tuple[Effect, ...]) -> None:
+def _check_places(effects: tuple[Effect, ...], hand: NominalHand) -> None:
     """Refuses an effect that one place has twice."""
     taken: set[tuple[str, int]] = set()
     for index, effect in enumerate(effects):
         fingers = CATALOGUE[effect.name].scope == "finger"
-        at = fingers_at(effect.where) if fingers else joints_at(effect.where)
-        new = {(effect.name, place) for place in at}
+        find = fingers_at if fingers else joints_at
+        new = {(effect.name, place) for place in find(hand, effect.where)}
         if taken & new:
             valid = f"places that have no {effect.name} by an entry before"
             found = list(effect.where)

@@ -1,12 +1,14 @@
 """The MuJoCo model of the hand: primitives of its nominal size, sensors for signals.
 
-Geometry is our own: one capsule per finger link (link 1 is inside the palm's reach and
-carries none), a box for the palm and one for the dorsal module. A fingertip meets the
+Geometry is our own: one capsule per finger link (link 1, inside the palm's reach, may
+carry none), a box for the palm and one for the dorsal module. A fingertip meets the
 floor with a sphere, the end of its capsule: the sides of MuJoCo's friction pyramid lie
 along a capsule that stands up in C MuJoCo and along the world's axes in MJX and Warp,
 which for a sphere do the same as C. Everything that two hands may differ in comes from
 the hand file.
 """
+
+import itertools
 
 import numpy as np
 from jaxtyping import Float
@@ -15,7 +17,7 @@ from envs.config.settings.hand import PHYSICS_DT_S as PHYSICS_DT_S
 from envs.hand.effect_parts import add_effect_parts
 from envs.hand.hand_file import HandFile
 from envs.hand.model_sensors import FLOOR, PALM, PAYLOAD, V_SITE, add_sensors
-from envs.hand.nominal import FINGERS, Link
+from envs.hand.nominal import FINGERS, Link, NominalHand
 from envs.physics.quiet_mujoco import mujoco
 
 # Contact groups as bits: what stands on the floor, and what the hand meets otherwise.
@@ -55,11 +57,12 @@ def build_spec(
     _set_options(spec)
     _add_floor(spec, hand)
     palm = _add_palm(spec, hand, q_off)
-    parent = palm
+    parent, each = palm, hand.nominal.links_per_finger
     for index, link in enumerate(hand.nominal.links):
-        parent = _add_link(palm if index % 4 == 0 else parent, link, index, hand)
+        finger, place = divmod(index, each)
+        parent = _add_link(parent if place else palm, link, FINGERS[finger], hand)
         _add_drive(spec, link, index, hand)
-    _exclude_neighbours(spec)
+    _exclude_neighbours(spec, hand.nominal)
     add_sensors(spec, hand)
     add_effect_parts(spec, hand, FLOOR)
     return spec
@@ -163,7 +166,7 @@ def _add_box(body, name, pos, half, rgba, hand) -> None:
 
 
 def _add_link(
-    parent: mujoco.MjsBody, link: Link, index: int, hand: HandFile
+    parent: mujoco.MjsBody, link: Link, finger: str, hand: HandFile
 ) -> mujoco.MjsBody:
     body = parent.add_body(
         name=link.body,
@@ -184,7 +187,7 @@ def _add_link(
         armature=link.armature,
     )
     if link.capsule:
-        _add_capsule(body, link, FINGERS[index // 4], hand)
+        _add_capsule(body, link, finger, hand)
     return body
 
 
@@ -224,9 +227,9 @@ def _add_capsule(body: mujoco.MjsBody, link: Link, finger: str, hand: HandFile) 
 
 def _add_drive(spec: mujoco.MjSpec, link: Link, index: int, hand: HandFile) -> None:
     """Adds the position servo: torque = kp (command − q) − kd q̇, clipped."""
-    kp = link.kp * hand.stiffness_scale.per_joint()[index]
-    kd = link.kv * hand.damping_scale.per_joint()[index]
-    limit = link.force_limit * hand.torque_scale.per_joint()[index]
+    kp = link.kp * hand.per_joint("stiffness_scale")[index]
+    kd = link.kv * hand.per_joint("damping_scale")[index]
+    limit = link.force_limit * hand.per_joint("torque_scale")[index]
     spec.add_actuator(
         name=link.joint,
         target=link.joint,
@@ -242,10 +245,14 @@ def _add_drive(spec: mujoco.MjSpec, link: Link, index: int, hand: HandFile) -> N
     )
 
 
-def _exclude_neighbours(spec: mujoco.MjSpec) -> None:
+def _exclude_neighbours(spec: mujoco.MjSpec, hand: NominalHand) -> None:
     """Excludes pairs that overlap by construction: each finger's base and the palm."""
-    for finger in range(1, 6):
+    for finger in range(1, len(hand.fingers) + 1):
         for other in (PALM, PAYLOAD):
             spec.add_exclude(bodyname1=other, bodyname2=f"finger{finger}_link2")
-    for other in (2, 3):  # the thumb's first free link lies along the index's base
+    bases = [k.body for k in hand.links[:: hand.links_per_finger] if k.capsule]
+    for one, other in itertools.combinations(bases, 2):  # fixed side by side
+        spec.add_exclude(bodyname1=one, bodyname2=other)
+    # The thumb's first free link lies along the index's base.
+    for other in range(2, min(4, hand.links_per_finger)):
         spec.add_exclude(bodyname1=PALM, bodyname2=f"finger1_link{other}")

@@ -1,7 +1,6 @@
 """The sensors of the hand's model, and the names of what they stand on."""
 
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import FINGERS
 from envs.physics.quiet_mujoco import mujoco
 
 FLOOR, PALM, PAYLOAD = "floor", "palm", "payload"
@@ -17,7 +16,7 @@ def add_sensors(spec: mujoco.MjSpec, hand: HandFile) -> None:
         "angvel": mujoco.mjtSensor.mjSENS_FRAMEANGVEL,
     }
     sites = [(V_SITE, ("pos", "quat", "linvel", "angvel"))]
-    sites += [(f"{f}_tip", ("pos", "quat", "linvel")) for f in FINGERS]
+    sites += [(f"{f}_tip", ("pos", "quat", "linvel")) for f in hand.nominal.fingers]
     for site, kinds in sites:
         for kind in kinds:
             spec.add_sensor(

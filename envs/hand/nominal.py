@@ -18,12 +18,8 @@ from envs.config.typed import from_dict, limits
 from envs.errors import InputError
 
 FINGERS = ("thumb", "index", "middle", "ring", "little")
-NAMES = tuple(
-    (f"finger{f}_link{i}", f"finger{f}_joint{i}")
-    for f in range(1, 6)
-    for i in range(1, 5)
-)
-"""Names of the 20 links and their joints."""
+"""The fingers of a hand of five; one with fewer has the first of them."""
+MOST_FINGERS, MOST_LINKS = 5, 8
 
 Vector = tuple[float, float, float]
 Quat = tuple[float, float, float, float]
@@ -117,34 +113,64 @@ def _check_inertia(part: Link | Palm) -> None:
 
 @dataclass(frozen=True)
 class NominalHand:
-    """The whole hand; `links` is finger-major, proximal to distal (5 × 4).
+    """The whole hand; `links` is finger-major, proximal to distal (n × m).
 
-    The first link of a finger has no capsule, only the last one a tip.
+    It has 3 to 5 fingers, thumb first, of 2 to 8 links each. Only the last link of a
+    finger has a tip; the first one may be without a capsule, inside the palm's reach.
     """
 
     palm: Palm
     links: tuple[Link, ...]
 
     def __post_init__(self) -> None:
-        found = tuple((link.body, link.joint) for link in self.links)
-        if found != NAMES:
-            wrong = next((f for f, n in zip(found, NAMES, strict=False) if f != n), "")
-            names = " ".join(wrong) or f"{len(found)} links"
-            valid = "20 links finger1_link1 to finger5_link4 with such joints, in order"
-            raise InputError("hand", "links", names, valid)
+        self._check_names()
         for index, link in enumerate(self.links):
-            shape = (link.capsule is not None, link.tip is not None)
-            if shape != (index % 4 > 0, index % 4 == 3):
-                valid = "a capsule on links 2 to 4 of a finger, a tip on link 4 alone"
+            place = index % self.links_per_finger
+            last = place == self.links_per_finger - 1
+            bare = link.capsule is None and place > 0
+            if bare or (link.tip is not None) != last:
+                valid = (
+                    "a capsule on each link after a finger's first, a tip on its last"
+                )
                 raise InputError("hand", f"links.{index}", link.body, valid)
 
     @property
+    def links_per_finger(self) -> int:
+        """Links of each finger, m."""
+        return sum(link.body.startswith("finger1_") for link in self.links)
+
+    @property
+    def fingers(self) -> tuple[str, ...]:
+        """Names of the fingers, n of `FINGERS`."""
+        return FINGERS[: len(self.links) // self.links_per_finger]
+
+    @property
     def joint_names(self) -> tuple[str, ...]:
-        """Names of the 20 joints in the order used everywhere."""
+        """Names of the joints in the order used everywhere."""
         return tuple(link.joint for link in self.links)
 
-    def per_joint(self, field: str) -> Float[np.ndarray, "20 ..."]:
-        """A parameter of all links, x_j, j = 1 … 20, as `per_joint("kp")` [N·m/rad].
+    @property
+    def tip_links(self) -> tuple[Link, ...]:
+        """The last link of each finger."""
+        return tuple(link for link in self.links if link.tip)
+
+    def _check_names(self) -> None:
+        found = tuple((link.body, link.joint) for link in self.links)
+        each = self.links_per_finger
+        count = len(found) // max(each, 1)
+        wanted = link_names(count, each)
+        fits = 3 <= count <= MOST_FINGERS and 2 <= each <= MOST_LINKS
+        if not fits or found != wanted:
+            wrong = next((f for f, n in zip(found, wanted, strict=False) if f != n), "")
+            names = " ".join(wrong) or f"{len(found)} links"
+            valid = (
+                "links finger1_link1, finger1_link2, … with such joints, in order: 3 "
+                f"to {MOST_FINGERS} fingers of equally many links, 2 to {MOST_LINKS}"
+            )
+            raise InputError("hand", "links", names, valid)
+
+    def per_joint(self, field: str) -> Float[np.ndarray, "joints ..."]:
+        """A parameter of all links, x_j, j = 1 … n·m, as `per_joint("kp")` [N·m/rad].
 
         Args:
             field: of `Link`, which states its unit [rad, kg, kg·m², N·m, …].
@@ -153,6 +179,15 @@ class NominalHand:
             WUJI right hand description 2026.04.27, or the hand file.
         """
         return np.array([getattr(link, field) for link in self.links])
+
+
+def link_names(fingers: int, links: int) -> tuple[tuple[str, str], ...]:
+    """Names of all links and their joints, finger by finger."""
+    return tuple(
+        (f"finger{f}_link{i}", f"finger{f}_joint{i}")
+        for f in range(1, fingers + 1)
+        for i in range(1, links + 1)
+    )
 
 
 def _link(raw: dict) -> Link:

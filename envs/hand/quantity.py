@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError, one_of
-from envs.hand.nominal import vendor_hand
 
 SOURCES = r"paper|vendor|ours|user|identified from \S.*"
 
@@ -54,7 +53,7 @@ class Vector:
 
 @dataclass(frozen=True)
 class JointQuantity:
-    """A number for all joints, a list of 20 in joint order, or 20 by joint name."""
+    """A number for all joints, a list of them in joint order, or all by joint name."""
 
     value: float | tuple[float, ...] | dict[str, float]
     unit: str
@@ -64,52 +63,70 @@ class JointQuantity:
     note: str = ""
 
     def __post_init__(self) -> None:
-        _check_quantity(self)
+        _check_source(self)  # the rest when its hand is known
 
-    def per_joint(self) -> Float[np.ndarray, "20"]:
-        """The values x_j, j = 1 … 20, thumb to little, proximal first [1, rad/s].
+    def per_joint(self, joints: tuple[str, ...]) -> Float[np.ndarray, " joints"]:
+        """The values x_j, j = 1 … n·m, thumb first, proximal first [1, rad/s].
 
         A single number holds for all joints: x_j = x.
+
+        Args:
+            joints: names of the hand's joints, in order.
 
         Source:
             Ours: one order of joints everywhere, that of the vendor's description.
         """
-        return np.broadcast_to(numbers(self, "value"), 20).copy()
+        return np.broadcast_to(numbers(self, "value", joints), len(joints)).copy()
 
 
-def _check_quantity(quantity: Quantity | Vector | JointQuantity) -> None:
-    """Refuses an unknown source and a value outside its own interval."""
+def _check_source(quantity: Quantity | Vector | JointQuantity) -> None:
+    """Refuses an unknown source."""
     if not re.fullmatch(SOURCES, quantity.source):
         valid = "paper, vendor, ours, user or 'identified from <log hash>'"
         raise InputError("hand file", "source", quantity.source, valid)
-    value = numbers(quantity, "value")
+
+
+def _check_quantity(quantity: Quantity | Vector) -> None:
+    _check_source(quantity)
+    check_interval(quantity)
+
+
+def check_interval(
+    quantity: Quantity | Vector | JointQuantity, joints: tuple[str, ...] = ()
+) -> None:
+    """Refuses a value outside its own interval, or not of these joints."""
+    value = numbers(quantity, "value", joints)
     for name, sign in (("low", 1), ("high", -1)):
         bound = getattr(quantity, name)
-        if bound is not None and np.any(sign * (value - numbers(quantity, name)) < 0):
+        if bound is None:
+            continue
+        if np.any(sign * (value - numbers(quantity, name, joints)) < 0):
             valid = f"a value inside the interval, whose {name} is {bound}"
             raise InputError("hand file", "value", quantity.value, valid)
 
 
-def numbers(quantity: Any, name: str) -> Float[np.ndarray, "..."]:
-    """A value or bound as an array x of shape (), (3) or (20) in joint order.
+def numbers(
+    quantity: Any, name: str, joints: tuple[str, ...] = ()
+) -> Float[np.ndarray, "..."]:
+    """A value or bound as an array x of shape (), (3) or (joints) in joint order.
 
     Args:
         quantity: a `Quantity`, `Vector` or `JointQuantity`; x = its number or numbers,
             in the unit it states [kg, m, s, 1, …].
         name: `value`, `low` or `high`.
+        joints: names of the hand's joints, for a `JointQuantity`.
 
     Source:
         Ours: files may name joints, arrays may not.
     """
     value = getattr(quantity, name)
     if isinstance(quantity, JointQuantity):
-        value = _in_joint_order(value, name)
+        value = _in_joint_order(value, name, joints)
     return np.asarray(value, dtype=float)
 
 
-def _in_joint_order(value: Any, name: str) -> Any:
+def _in_joint_order(value: Any, name: str, joints: tuple[str, ...]) -> Any:
     """Checks names and count of per-joint numbers; a single number passes."""
-    joints = vendor_hand().joint_names
     if isinstance(value, Mapping):
         for joint in value:
             if joint not in joints:
@@ -117,7 +134,7 @@ def _in_joint_order(value: Any, name: str) -> Any:
                 raise InputError("hand file", f"{name}.{joint}", joint, valid)
         missing = [joint for joint in joints if joint not in value]
         if missing:
-            valid = "all 20 joints, also " + ", ".join(missing)
+            valid = f"all {len(joints)} joints, also " + ", ".join(missing)
             raise InputError("hand file", name, f"{len(value)} joints", valid)
         return [value[joint] for joint in joints]
     if isinstance(value, tuple) and len(value) != len(joints):

@@ -17,10 +17,8 @@ from jaxtyping import Float
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PALM, PHYSICS_DT_S, build_model
-from envs.hand.nominal import FINGERS
 
 SETTLE_S = 4.0
-_FORWARD_LINKS = tuple(f"finger{number}_link4" for number in (2, 3, 4, 5))
 
 
 @dataclass(frozen=True)
@@ -28,12 +26,12 @@ class Stance:
     """A settled stance.
 
     Attributes:
-        target_rad: joint targets that were held (20).
-        joint_pos_rad: settled joint angles (20), the reference of the observations.
+        target_rad: joint targets that were held.
+        joint_pos_rad: settled joint angles, the reference of the observations.
         root_pos_w: settled palm origin [m], above the world's origin.
         root_quat_w: settled palm orientation, w x y z, V pointing along world x.
         q_off: rotation from the palm to the control frame V, w x y z.
-        footprint_v: tip centres relative to the palm origin, in V [m] (5 × 3).
+        footprint_v: tip centres relative to the palm origin, in V [m] (n × 3).
         hand_sha256: digest of the hand file it was settled with.
     """
 
@@ -47,7 +45,7 @@ class Stance:
 
     @property
     def qpos(self) -> np.ndarray:
-        """Settled generalized position (27)."""
+        """Settled generalized position."""
         return np.array([*self.root_pos_w, *self.root_quat_w, *self.joint_pos_rad])
 
 
@@ -61,7 +59,7 @@ def load_stance(package: str = "envs.hand", name: str = "stance.json") -> Stance
 
 
 def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
-    """The stance of a hand: the stored one, settled anew for another hand.
+    """The stance of a hand: its own or the stored one, settled anew for another hand.
 
     The joint targets are the same; how deep a hand sinks under them depends on its
     mass, stiffness and friction. Effects do not enter: they show as what differs from
@@ -74,10 +72,24 @@ def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
     Raises:
         InputError: the hand does not stand under these targets.
     """
-    stored, hand = stored or load_stance(), hand.without_effects
+    hand = hand.without_effects
+    if stored is None and hand.stance:
+        return settle(
+            hand, np.array(hand.stance.qpos), np.array(hand.stance.target_rad)
+        )
+    stored = stored or load_stance()
+    _check_joints(hand, stored)
     if hand.sha256 == stored.hand_sha256:
         return stored
     return settle(hand, stored.qpos, np.array(stored.target_rad))
+
+
+def _check_joints(hand: HandFile, stored: Stance) -> None:
+    """Refuses a hand that the stored stance cannot be one of."""
+    count, wanted = len(hand.nominal.links), len(stored.target_rad)
+    if count != wanted:
+        valid = f"a stance of its own for {count} joints: the stored one has {wanted}"
+        raise InputError("hand file", "stance", "none", valid)
 
 
 def stance_json(stance: Stance) -> str:
@@ -86,7 +98,7 @@ def stance_json(stance: Stance) -> str:
 
 
 def settle(
-    hand: HandFile, qpos: Float[np.ndarray, "27"], target: Float[np.ndarray, "20"]
+    hand: HandFile, qpos: Float[np.ndarray, " nq"], target: Float[np.ndarray, " joints"]
 ) -> Stance:
     """Holds joint targets and records the settled stance: s = s(4 s), max |q̇| < 0.01.
 
@@ -108,7 +120,7 @@ def settle(
         mujoco.mj_step(model, data)
     _check_settled(data)
     mujoco.mj_forward(model, data)
-    return _describe(model, data, target, hand.sha256)
+    return _describe(model, data, target, hand)
 
 
 def _check_settled(data: mujoco.MjData) -> None:
@@ -119,19 +131,22 @@ def _check_settled(data: mujoco.MjData) -> None:
 
 
 def _describe(
-    model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, sha256: str
+    model: mujoco.MjModel, data: mujoco.MjData, target: np.ndarray, hand: HandFile
 ) -> Stance:
     """Turns the heading of a settled pose to world x and derives V and the footprint.
 
     V is level in the settled pose; its x is the horizontal direction from the palm to
-    the centroid of the index–little distal links (paper, control frame).
+    the centroid of the distal links of all fingers but the thumb (paper, control
+    frame).
     """
     origin = data.body(PALM).xpos.copy()
-    links = np.mean([data.body(name).xpos for name in _FORWARD_LINKS], axis=0)
+    nominal = hand.nominal
+    forward = [link.body for link in nominal.tip_links[1:]]
+    links = np.mean([data.body(name).xpos for name in forward], axis=0)
     heading = np.arctan2(*(links - origin)[[1, 0]])
     unturn = np.array([np.cos(heading / 2), 0.0, 0.0, -np.sin(heading / 2)])
     root = _multiply(unturn, data.qpos[3:7])
-    tips = [data.site(f"{finger}_tip").xpos - origin for finger in FINGERS]
+    tips = [data.site(f"{finger}_tip").xpos - origin for finger in nominal.fingers]
     return Stance(
         target_rad=_floats(target),
         joint_pos_rad=_floats(data.qpos[7:]),
@@ -139,7 +154,7 @@ def _describe(
         root_quat_w=_floats(root),
         q_off=_floats(_conjugate(root)),
         footprint_v=tuple(_floats(_rotate(unturn, tip)) for tip in tips),
-        hand_sha256=sha256,
+        hand_sha256=hand.sha256,
     )
 
 

@@ -3,14 +3,10 @@
 import numpy as np
 from jaxtyping import Float
 
-from envs.hand.nominal import FINGERS
-
-_HULL = [0, 4, 3, 2, 1]  # thumb, little, ring, middle, index: around the footprint
-
 
 def support_margins(
     point: Float[np.ndarray, "2"],
-    tips: Float[np.ndarray, "5 2"],
+    tips: Float[np.ndarray, "tips 2"],
     lifted: int | None = None,
 ) -> Float[np.ndarray, " n"]:
     """Signed distances d_i = n_i · (p − v_i) [m] to the footprint's edges; inside > 0.
@@ -19,14 +15,15 @@ def support_margins(
 
     Args:
         point: such as the centre of mass on the floor [m].
-        tips: of the five fingers on the floor [m].
+        tips: of all fingers on the floor [m].
         lifted: finger that does not support; none if not given.
 
     Source:
         R. McGhee, A. Frank, On the stability properties of quadruped creeping gaits,
         Mathematical Biosciences 3, 1968 (static stability margin).
     """
-    start = tips[[finger for finger in _HULL if finger != lifted]]
+    around = (0, *range(len(tips) - 1, 0, -1))  # thumb, little, …, index
+    start = tips[[finger for finger in around if finger != lifted]]
     edge = np.roll(start, -1, axis=0) - start
     area = np.sum(start[:, 0] * np.roll(start[:, 1], -1))
     area -= np.sum(np.roll(start[:, 0], -1) * start[:, 1])
@@ -36,17 +33,17 @@ def support_margins(
 
 
 def lifted_margins(
-    point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "5 2"]
-) -> Float[np.ndarray, "5"]:
-    """Margins with one finger lifted: m_k = min_i d_i on the other four tips [m].
+    point: Float[np.ndarray, "2"], tips: Float[np.ndarray, "tips 2"]
+) -> Float[np.ndarray, " tips"]:
+    """Margins with one finger lifted: m_k = min_i d_i on the other tips [m].
 
     Args:
         point: such as the centre of mass on the floor [m].
-        tips: of the five fingers on the floor [m].
+        tips: of all fingers on the floor [m].
 
     Source:
         As `support_margins`.
     """
     return np.array(
-        [support_margins(point, tips, lifted).min() for lifted in range(len(FINGERS))]
+        [support_margins(point, tips, lifted).min() for lifted in range(len(tips))]
     )

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
@@ -11,6 +11,8 @@ from jaxtyping import Array, Float, PRNGKeyArray, Shaped
 from envs.commands import sample_command
 from envs.config.settings.crawl import CrawlConfig as CrawlConfig
 from envs.config.settings.rows import table_of
+from envs.hand.hand_file import HandFile
+from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.plant import Plant
@@ -28,12 +30,20 @@ class Crawl(Walking):
 
     Attributes:
         config: settings of the task.
+        tips: fingertips of the hand.
         table: rows of the reward that the settings name; they may bind every signal,
             those of `scene_signals` and the magnitudes of `magnitudes`.
     """
 
     config: CrawlConfig
+    tips: int = field(default=5, kw_only=True)
     table: RewardTable = field(init=False)
+
+    @classmethod
+    def on(cls, config: CrawlConfig, hand: HandFile, stance: Stance) -> Self:
+        """The task for a hand with as many fingertips as its stance."""
+        del hand
+        return cls(config, tips=len(stance.footprint_v))
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "table", table_of("crawl", self.config.rewards))
@@ -48,7 +58,7 @@ class Crawl(Walking):
 
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+    ) -> tuple[PhysicsState, Float[Array, " joints"]]:
         """The stance with noise, q = q* + u, at a random heading, under its targets.
 
         Returns:

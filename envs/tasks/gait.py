@@ -39,14 +39,14 @@ class Stepped:
     Attributes:
         signal: that rows bind; a table that does not bind it carries no memory.
         field: of `envs.memory.Memory`.
-        begin: makes the memory at an episode's start.
+        begin: makes the memory of so many fingertips at an episode's start.
         step: (memory, signals, control interval) -> (memory, signal).
         with_command: whether a new command begins it anew.
     """
 
     signal: str
     field: str
-    begin: Callable[[], Any]
+    begin: Callable[[int], Any]
     step: Callable[[Any, Signals, float], tuple[Any, Array]]
     with_command: bool
 
@@ -56,7 +56,12 @@ class Walking(HandTask):
 
     What it carries is what its table binds. `begin_episode` gives `begin_gait`. The
     settings are `UprightSettings`.
+
+    Attributes:
+        tips: fingertips of the hand.
     """
+
+    tips: int = 5
 
     def binds(self, signal: str) -> bool:
         """Whether a row of the table binds this signal."""
@@ -64,16 +69,18 @@ class Walking(HandTask):
 
     def begin_world(self) -> dict[str, Any]:
         """No footprint yet: it is captured in the first step and then kept (paper)."""
-        return {"footprint": init_footprint_memory()} if self.binds(FOOTPRINT) else {}
+        if not self.binds(FOOTPRINT):
+            return {}
+        return {"footprint": init_footprint_memory(self.tips)}
 
     def begin_gait(self) -> dict[str, Any]:
         """Fresh memories of the rewards, by field of `Memory`."""
-        return {kept.field: kept.begin() for kept in self._stepped}
+        return {kept.field: kept.begin(self.tips) for kept in self._stepped}
 
     def begin_with_command(self) -> dict[str, Any]:
         """Those of them that begin anew with a new command."""
         new = [kept for kept in self._stepped if kept.with_command]
-        return {kept.field: kept.begin() for kept in new}
+        return {kept.field: kept.begin(self.tips) for kept in new}
 
     def magnitudes(
         self, memory: Memory, signals: Signals, valid: Bool[Array, ""]
@@ -122,7 +129,7 @@ class Walking(HandTask):
 
 def _footprint(
     memory: Memory, signals: Signals, valid: Bool[Array, ""]
-) -> tuple[Memory, Float[Array, "5 3"]]:
+) -> tuple[Memory, Float[Array, "tips 3"]]:
     """Returns the memory and the targets, captured in the world's first valid step."""
     world = memory.world
     stepped = footprint_step(world.footprint, signals.tip_pos_v)
@@ -167,7 +174,7 @@ _STEPPED = (
     Stepped(
         "mean_error_v",
         "mean_error",
-        init_mean_error_memory,
+        lambda tips: init_mean_error_memory(),
         _mean_error,
         with_command=True,
     ),

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from envs.config.settings.hand import UprightSettings as UprightSettings
-from envs.hand.spec import HAND_NQ, JOINT_QPOS
 from envs.physics import PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply
@@ -52,14 +51,16 @@ def near_stance(
             pose[:3],
             multiply(random_heading(key), pose[3:7]),
             near_joints(key, plant, joint_rad),
-            pose[HAND_NQ:],
+            pose[plant.spec.nq :],
         ]
     )
     qvel = jnp.zeros(plant.mj_model.nv).at[:3].set(vel)
     return PhysicsState(qpos=qpos, qvel=qvel, qacc_warmstart=jnp.zeros_like(qvel))
 
 
-def near_joints(key: PRNGKeyArray, plant: Plant, most_rad: float) -> Float[Array, "20"]:
+def near_joints(
+    key: PRNGKeyArray, plant: Plant, most_rad: float
+) -> Float[Array, " joints"]:
     """Joints of the stance with noise, q = clip(q* + u, limits), u ∈ [−b, b] at random.
 
     Args:
@@ -74,10 +75,13 @@ def near_joints(key: PRNGKeyArray, plant: Plant, most_rad: float) -> Float[Array
         Ours.
     """
     noise = jax.random.uniform(
-        stream(key, "joints"), (20,), minval=-most_rad, maxval=most_rad
+        stream(key, "joints"),
+        plant.joint_range.shape[:1],
+        minval=-most_rad,
+        maxval=most_rad,
     )
     low, high = plant.joint_range[:, 0], plant.joint_range[:, 1]
-    return jnp.clip(plant.rest.state.qpos[JOINT_QPOS] + noise, low, high)
+    return jnp.clip(plant.rest.state.qpos[plant.spec.joint_qpos] + noise, low, high)
 
 
 def random_heading(key: PRNGKeyArray) -> Float[Array, "4"]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,29 +15,6 @@ if TYPE_CHECKING:
 
 STANCE_STARTS = 40
 """Starts with which the stored stance was found."""
-
-_TURN = {"low": -1.0, "high": 1.0}
-
-
-@dataclass(frozen=True)
-class JointMap:
-    """How a user's model names what ours does.
-
-    Attributes:
-        joints: our joint name -> the model's, for those that differ.
-        palm_quat: our palm frame, back of the hand at -x and fingers at +z, in the
-            model's palm body, w x y z; found by the finger bases if not given.
-    """
-
-    joints: dict[str, str] = field(default_factory=dict)
-    palm_quat: tuple[float, float, float, float] | None = field(
-        default=None, metadata=_TURN
-    )
-
-    def __post_init__(self) -> None:
-        if self.palm_quat and abs(sum(x * x for x in self.palm_quat) - 1.0) > 1e-3:
-            valid = "w x y z of length 1"
-            raise InputError("joint map", "palm_quat", self.palm_quat, valid)
 
 
 def add(commands) -> None:
@@ -102,15 +78,19 @@ def _add_import(actions) -> None:
         "import",
         import_mjcf,
         "make a hand file of an MJCF of your own",
-        "Carries an MJCF of the hand, such as the vendor's with meshes, over into a "
-        "hand file for --hand: kinematics, inertia, limits and gains are its own, "
-        "collision shapes are fitted to it. Lists what it lacks.",
+        "Carries an MJCF of a hand over into a hand file for --hand: kinematics, "
+        "inertia, limits and gains are its own, collision shapes are fitted to it. "
+        "Lists what it lacks. For a hand whose fingers the map names, a stance is "
+        "searched.",
         computes=False,
     )
     options.path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
-    what = "YAML: joints, our names to the model's; palm_quat, where asked for"
+    what = "YAML: joints, our names to the model's, or fingers; palm_quat; drive"
     options.path(parser, "--joint-map", help=what)
     options.path(parser, "-o", "--out", required=True, help="hand file")
+    options.seed(parser)
+    what = "random starts of the search, if there is one"
+    options.value(parser, "--starts", options.whole(1), STANCE_STARTS, what)
 
 
 def show(args: argparse.Namespace) -> int:
@@ -156,14 +136,19 @@ def import_mjcf(args: argparse.Namespace) -> int:
     from envs.config.typed import load_yaml
     from envs.hand.hand_file import hand_yaml
     from envs.hand.importing.convert import import_hand
+    from envs.hand.importing.joint_map import JointMap
+    from envs.hand.stance_search import with_stance
 
     options.check_file("--out", args.out)
     given = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
-    found = import_hand(args.mjcf, given.joints, given.palm_quat)
+    found = import_hand(args.mjcf, given)
     for sentence in found.notes:
         print(sentence)
-    print(_standing(found.hand))
-    _write(hand_yaml(found.hand), args.out)
+    hand = found.hand
+    if given.fingers:
+        hand = with_stance(hand, args.seed, args.starts, progress=_progress)
+    print(_standing(hand))
+    _write(hand_yaml(hand), args.out)
     print(f"wrote {args.out}")
     return 0
 
@@ -184,11 +169,17 @@ def _write(text: str, out: Path | None) -> int:
     return 0
 
 
+def _progress(done: int, starts: int) -> None:
+    end = "\n" if done == starts else "\r"
+    print(f"stance search: {done} of {starts} starts", end=end, flush=True)
+
+
 def _standing(hand: HandFile) -> str:
     from envs.hand.stance import stance_of
 
+    whose = "its own" if hand.stance else "the stored"
     try:
         height = 1000 * stance_of(hand).root_pos_w[2]
     except InputError as error:
-        return f"does not stand under the stored joint targets: {error.found}"
-    return f"stands under the stored joint targets, the palm {height:.1f} mm up"
+        return f"does not stand under {whose} joint targets: {error.found}"
+    return f"stands under {whose} joint targets, the palm {height:.1f} mm up"

@@ -54,8 +54,8 @@ def task_speed_mps(
 
 
 def contacts(
-    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
-) -> Bool[Array, "T 5"]:
+    tip_force_n: Float[Array, "T tips"], alive: Bool[Array, " T"]
+) -> Bool[Array, "T tips"]:
     """c_ti = (F_ti ≥ F_th) ∧ m_t: which tips carry at least 0.15 N [N] in which steps.
 
     Source:
@@ -65,8 +65,8 @@ def contacts(
 
 
 def touchdowns(
-    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
-) -> Float[Array, "5"]:
+    tip_force_n: Float[Array, "T tips"], alive: Bool[Array, " T"]
+) -> Float[Array, " tips"]:
     """Σ_t c_ti ∧ ¬c_{t-1,i}: number of rising edges of each tip's contact [1].
 
     The force is in [N]. A tip that stands at the start has not touched down yet (ours).
@@ -79,8 +79,8 @@ def touchdowns(
 
 
 def contact_fraction(
-    contact: Bool[Array, "T 5"], alive: Bool[Array, " T"]
-) -> Float[Array, "5"]:
+    contact: Bool[Array, "T tips"], alive: Bool[Array, " T"]
+) -> Float[Array, " tips"]:
     """Σ_t m_t c_ti / Σ_t m_t in [0, 1]: fraction of steps with contact of each tip [1].
 
     Source:
@@ -91,7 +91,7 @@ def contact_fraction(
 
 
 def five_finger_participation(
-    tip_force_n: Float[Array, "T 5"], alive: Bool[Array, " T"]
+    tip_force_n: Float[Array, "T tips"], alive: Bool[Array, " T"]
 ) -> Float[Array, ""]:
     """∧_i (touchdowns_i ≥ 3 ∧ contact fraction_i ≥ 0.05) as 0 or 1 [1].
 
@@ -106,8 +106,8 @@ def five_finger_participation(
 
 
 def non_nail_participation(
-    tip_force_n: Float[Array, "T 5"],
-    pad_tilt_rad: Float[Array, "T 5"],
+    tip_force_n: Float[Array, "T tips"],
+    pad_tilt_rad: Float[Array, "T tips"],
     alive: Bool[Array, " T"],
 ) -> Float[Array, ""]:
     """∧_i (touchdowns_i ≥ 3 ∧ fraction of c_ti ∧ (θ_ti < 64°) ≥ 0.05) as 0 or 1 [1].
@@ -124,10 +124,10 @@ def non_nail_participation(
 
 
 def contact_tilt_rad(
-    tip_force_n: Float[Array, "T 5"],
-    pad_tilt_rad: Float[Array, "T 5"],
+    tip_force_n: Float[Array, "T tips"],
+    pad_tilt_rad: Float[Array, "T tips"],
     alive: Bool[Array, " T"],
-) -> Float[Array, "5"]:
+) -> Float[Array, " tips"]:
     """Σ_t c_ti θ_ti / Σ_t c_ti: mean tilt of each tip while in contact [rad].
 
     The tilt θ is the elevation of the pad's normal above the horizontal: -π/2 lies flat
@@ -141,8 +141,8 @@ def contact_tilt_rad(
 
 
 def worst_tip_planting_fraction(
-    tip_force_n: Float[Array, "T 5"],
-    pad_tilt_rad: Float[Array, "T 5"],
+    tip_force_n: Float[Array, "T tips"],
+    pad_tilt_rad: Float[Array, "T tips"],
     alive: Bool[Array, " T"],
 ) -> Float[Array, ""]:
     """min_i Σ_t c_ti (θ_ti < 64°) / Σ_t c_ti in [0, 1], from tilts θ [rad].

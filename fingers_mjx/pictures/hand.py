@@ -10,8 +10,7 @@ from scipy.spatial import ConvexHull
 
 from envs.hand.hand_file import HandFile
 from envs.hand.model import V_SITE, build_model
-from envs.hand.nominal import FINGERS
-from envs.hand.spec import TIP_SITES
+from envs.hand.spec import HandSpec, hand_spec
 from envs.hand.stance import Stance
 from envs.hand.support import support_margins
 from fingers_mjx.pictures.camera import Camera
@@ -50,14 +49,20 @@ class Posed:
     data: mujoco.MjData
 
     @property
-    def tips_w(self) -> Float[np.ndarray, "5 3"]:
-        """Centres of the fingertips [m]."""
-        return np.array([self.data.site(name).xpos for name in TIP_SITES])
+    def spec(self) -> HandSpec:
+        """Names in the scene."""
+        return hand_spec(self.model)
 
     @property
-    def pads_w(self) -> Float[np.ndarray, "5 3"]:
+    def tips_w(self) -> Float[np.ndarray, "tips 3"]:
+        """Centres of the fingertips [m]."""
+        return np.array([self.data.site(name).xpos for name in self.spec.tip_sites])
+
+    @property
+    def pads_w(self) -> Float[np.ndarray, "tips 3"]:
         """Unit normals of the pads, away from the nail."""
-        return np.array([self.data.site(n).xmat.reshape(3, 3)[:, 0] for n in TIP_SITES])
+        sites = [self.data.site(name) for name in self.spec.tip_sites]
+        return np.array([site.xmat.reshape(3, 3)[:, 0] for site in sites])
 
     @property
     def com_w(self) -> Float[np.ndarray, "3"]:
@@ -94,7 +99,10 @@ def facts(hand: Posed) -> dict[str, float]:
         "palm_height_mm": 1000 * float(palm.xpos[2]),
         "palm_pitch_deg": float(np.degrees(np.arcsin(-palm.xmat.reshape(3, 3)[2, 2]))),
         "static_margin_mm": 1000 * float(margins.min()),
-        **{f"pad_tilt_deg_{f}": float(t) for f, t in zip(FINGERS, tilts, strict=True)},
+        **{
+            f"pad_tilt_deg_{finger}": float(tilt)
+            for finger, tilt in zip(hand.spec.fingers, tilts, strict=True)
+        },
     }
 
 
@@ -126,7 +134,7 @@ def _items(hand: Posed) -> list[Item]:
         Dots(tips, PAD_COLOUR, 4.0),
         *(
             Label(t + BELOW_M, f, PAD_COLOUR)
-            for t, f in zip(tips, FINGERS, strict=True)
+            for t, f in zip(tips, hand.spec.fingers, strict=True)
         ),
     ]
     return items + frame_axes(site.xpos, site.xmat.reshape(3, 3), AXIS_M, axes)

@@ -48,20 +48,24 @@ class Behaviours:
         self._source = FixedCommand(sticks)
         self.reset(interface.initial_target_rad)
 
-    def reset(self, target_rad: Float[np.ndarray, "20"] | tuple[float, ...]) -> None:
+    def reset(
+        self, target_rad: Float[np.ndarray, " joints"] | tuple[float, ...]
+    ) -> None:
         """Starts an episode with the joint targets `target_rad` [rad] on the wire."""
         self._policies = Policies(self._controllers, Sources(self._source))
         self.target_rad = np.asarray(target_rad, float)
         self.tick = -1
-        self._ask(np.zeros(20), np.array([0.0, 0.0, -1.0]), np.zeros(3), False)
+        self._ask(
+            np.zeros(len(target_rad)), np.array([0.0, 0.0, -1.0]), np.zeros(3), False
+        )
 
     def step(
         self,
-        joint_pos: Float[np.ndarray, "20"],
+        joint_pos: Float[np.ndarray, " joints"],
         gravity_b: Float[np.ndarray, "3"],
         angvel_b: Float[np.ndarray, "3"],
         command: Float[np.ndarray, " n"],
-    ) -> Float[np.ndarray, "20"]:
+    ) -> Float[np.ndarray, " joints"]:
         """Returns the joint targets [rad] of this control step.
 
         Args:
@@ -80,7 +84,7 @@ class Behaviours:
         return self.target_rad.astype(np.float32)
 
     @property
-    def action(self) -> Float[np.ndarray, "20"]:
+    def action(self) -> Float[np.ndarray, " joints"]:
         """Last clipped output of the policy that runs."""
         return self._controllers[self._policies.active].action
 
@@ -96,7 +100,7 @@ class Behaviours:
 
     def _ask(
         self,
-        joint_pos: Float[np.ndarray, "20"],
+        joint_pos: Float[np.ndarray, " joints"],
         gravity_b: Float[np.ndarray, "3"],
         angvel_b: Float[np.ndarray, "3"],
         runs: bool,

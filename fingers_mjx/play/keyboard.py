@@ -117,7 +117,7 @@ class KeyPlayer(Player):
         return _asking(memory, self._state, waited), row
 
     def _task_inputs(
-        self, memory: Memory, sensed: Sample, joint_pos: Float[np.ndarray, "20"]
+        self, memory: Memory, sensed: Sample, joint_pos: Float[np.ndarray, " joints"]
     ) -> Float[np.ndarray, " inputs"]:
         v_quat_b = self.controller.bundle.manifest.interface.v_quat_b
         tip_v = pressing_fingertip(joint_pos, v_quat_b)

@@ -11,7 +11,6 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.hand.nominal import vendor_hand
 from envs.physics import PhysicsState
 from fingers_deploy.rotations import multiply
 from fingers_mjx.play.player import Played, Player, Schedule
@@ -48,7 +47,7 @@ class WalkRecorder(Player):
         self.rows: list[dict[str, np.ndarray]] = []
         return super().play(key, steps, schedule)
 
-    def _target(self, memory: Any, state: PhysicsState) -> Float[np.ndarray, "20"]:
+    def _target(self, memory: Any, state: PhysicsState) -> Float[np.ndarray, " joints"]:
         target = super()._target(memory, state)
         sensed: Any = jax.device_get(self._read(memory, state))
         reference = np.asarray(self.env.stance.joint_pos_rad)
@@ -58,7 +57,9 @@ class WalkRecorder(Player):
             "gravity": sensed.gravity,
             "gyro": sensed.angvel,
             "base": np.asarray(state.qpos[:7], float),
-            "tau": self.rows[-1]["after"] if self.rows else np.full(20, np.nan),
+            "tau": self.rows[-1]["after"]
+            if self.rows
+            else np.full(target.shape, np.nan),
         }
         self.rows.append(row)
         return target
@@ -75,11 +76,15 @@ class WalkRecorder(Player):
             rng: draws the noise.
             noise: its size; `WalkNoise()` if not given.
         """
-        return _log(self.rows, self.env.dt, rng, noise or WalkNoise())
+        return _log(
+            self.env.spec.joints, self.rows, self.env.dt, rng, noise or WalkNoise()
+        )
 
 
-def _log(rows, dt: float, rng: np.random.Generator, noise: WalkNoise) -> MeasuredLog:
-    names, columns = vendor_hand().joint_names, {}
+def _log(
+    names: tuple[str, ...], rows, dt: float, rng: np.random.Generator, noise: WalkNoise
+) -> MeasuredLog:
+    columns = {}
     gathered = {k: np.stack([row[k] for row in rows]) for k in rows[0] if k != "after"}
     size = {"pos": noise.joint_rad, "tau": noise.effort_nm, "cmd": 0.0}
     for quantity, sigma in size.items():

@@ -23,7 +23,6 @@ from envs.actuator.effect import Params
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.hand.drive.drive import DriveState
-from envs.hand.nominal import vendor_hand
 from envs.memory import Memory, PerWorldState
 from envs.observations import Sample
 from envs.physics import ModelFields, PhysicsOutput, PhysicsState
@@ -81,7 +80,7 @@ class Player:
     def __init__(self, env: BatchEnv, bundle: Bundle, runtime: Runtime = "auto"):
         self.env = env
         self.controller = PolicyController(bundle, runtime)
-        self.controller.check_joint_order(vendor_hand().joint_names)
+        self.controller.check_joint_order(env.spec.joints)
         self._inputs = PlayInputs(env)
         self._reset = jax.jit(env.env.reset)
         self._read: Callable[..., Sample] = jax.jit(self._reading)
@@ -159,11 +158,13 @@ class Player:
         return jax.jit(lambda p, *args: dataclasses.replace(chain, params=p).act(*args))
 
     @property
-    def action(self) -> Float[np.ndarray, "20"]:
+    def action(self) -> Float[np.ndarray, " joints"]:
         """Last clipped policy output."""
         return self.controller.action
 
-    def _target(self, memory: Memory, state: PhysicsState) -> Float[np.ndarray, "20"]:
+    def _target(
+        self, memory: Memory, state: PhysicsState
+    ) -> Float[np.ndarray, " joints"]:
         """Returns what the shim makes of what the sensors measure."""
         sensed = self._read(memory, state)
         reference = np.asarray(self.env.stance.joint_pos_rad, np.float32)
@@ -176,7 +177,7 @@ class Player:
         )
 
     def _task_inputs(
-        self, memory: Memory, sensed: Sample, joint_pos: Float[np.ndarray, "20"]
+        self, memory: Memory, sensed: Sample, joint_pos: Float[np.ndarray, " joints"]
     ) -> Float[np.ndarray, " inputs"]:
         del joint_pos
         return self._inputs.read(memory, sensed)
@@ -189,7 +190,7 @@ class Player:
         model: mujoco.MjModel,
         data: mujoco.MjData,
         memory: Memory,
-        target: Float[np.ndarray, "20"],
+        target: Float[np.ndarray, " joints"],
     ) -> DriveState:
         """Advances C MuJoCo by a control step; returns the drive's new state."""
         drive, state = self.env.plant.drive, memory.drive
@@ -208,7 +209,7 @@ class Player:
         memory: Memory,
         before: PhysicsState,
         output: PhysicsOutput,
-        action: Float[Array, "20"],
+        action: Float[Array, " joints"],
     ) -> tuple[Memory, Trace]:
         """Returns the memory for the next step and this step's part of the trace."""
         env = self.env

@@ -9,7 +9,6 @@ from typing import Any
 from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import vendor_hand
 from envs.observations import HISTORY, TERMS, InputTerm
 from fingers_deploy.manifest import (
     Action,
@@ -26,23 +25,16 @@ INTERFACE = "interface"
 TOLERANCE = 1e-6
 """Largest difference between numbers that count as the same (settling rounds)."""
 
-# Name in the manifest, entries, frame and unit of each term of `envs.observations`.
-_TERMS: Mapping[str, InputTerm] = {
-    "joint_pos": InputTerm("joint_pos", 20, "joint", "rad"),
-    "gravity": InputTerm("gravity_b", 3, "palm", "1"),
-    "angvel": InputTerm("angvel_b", 3, "palm", "rad/s"),
-    "action": InputTerm("previous_action", 20, "joint", "1"),
-}
-
 
 def interface_of(env: BatchEnv) -> Interface:
     """Returns the interface of a policy trained in `env`."""
     stance, config = env.stance, env.config
     limits = env.spec.joint_range_rad.tolist()
     inputs = env.input_terms
-    terms = tuple(_term(term) for term in (*(_TERMS[name] for name in TERMS), *inputs))
+    common = _common_terms(len(env.spec.joints))
+    terms = tuple(_term(term) for term in (*(common[name] for name in TERMS), *inputs))
     return Interface(
-        joint_names=vendor_hand().joint_names,
+        joint_names=env.spec.joints,
         reference_angles_rad=stance.joint_pos_rad,
         joint_limits_rad=tuple((low, high) for low, high in limits),
         initial_target_rad=stance.target_rad,
@@ -103,6 +95,16 @@ def check_interface(
             raise InputError(source, field, value, valid)
 
 
+def _common_terms(joints: int) -> Mapping[str, InputTerm]:
+    """Name in the manifest, entries, frame and unit of what every task observes."""
+    return {
+        "joint_pos": InputTerm("joint_pos", joints, "joint", "rad"),
+        "gravity": InputTerm("gravity_b", 3, "palm", "1"),
+        "angvel": InputTerm("angvel_b", 3, "palm", "rad/s"),
+        "action": InputTerm("previous_action", joints, "joint", "1"),
+    }
+
+
 def _term(term: InputTerm) -> Term:
     name, size, frame, unit = term.name, term.size, term.frame, term.unit
     return Term(name, size, frame, unit, scale=1.0, history=HISTORY)
@@ -113,7 +115,7 @@ def _command_path(hand: HandFile) -> CommandPath:
     return CommandPath(
         delay_s=hand.delay_s.value,
         lowpass_hz=hand.lowpass_hz.value,
-        slew_rad_s=tuple(hand.speed_limit.per_joint().tolist()),
+        slew_rad_s=tuple(hand.per_joint("speed_limit").tolist()),
     )
 
 

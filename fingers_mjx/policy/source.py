@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from envs.errors import InputError
-from envs.hand.nominal import vendor_hand
 from fingers_deploy import Bundle, load_bundle
+from fingers_deploy.bundle import check_joint_order
 from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import (
     check_interface,
@@ -78,7 +78,7 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
         BundleError: a bundle that is damaged or made for another hand.
     """
     check_kind(path)
-    bundle = load_bundle(path, vendor_hand().joint_names)
+    bundle = load_bundle(path)
     directory = path if path.is_dir() else path.parent
     found = config_digest(directory)
     wanted = bundle.manifest.provenance.config_sha256
@@ -88,6 +88,7 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
         raise InputError(directory, what, f"SHA-256 {found[:12]}…", valid)
     task = bundle.manifest.task
     setup = load_setup(directory / CONFIG_FILE, directory / HAND_FILE, task)
+    check_joint_order(bundle, setup.hand.nominal.joint_names)
     ours = interface_of(make_env(setup, 1, "cpu"))
     check_interface(bundle.source, bundle.manifest.interface, ours)
     return bundle, setup

@@ -115,16 +115,22 @@ def _verdict(diagnosis: Diagnosis) -> list:
     return blocks
 
 
-def _pictures(one: Examined) -> list[Picture]:
-    """Measured against simulated, residuals, and what they depend on."""
+def diagnosis_figures(one: Examined) -> dict[str, Figure]:
+    """Draws what was done with a joint that moved; by caption.
+
+    Args:
+        one: from `sysid.diagnosis.diagnose.examine`, with a search.
+    """
     joint = _joint(one)
-    return [
-        picture(_angles(joint), "Measured and simulated angle, and their difference."),
-        picture(
-            _residuals(joint), "Residuals on the measured motion, before and after."
-        ),
-        picture(_features(joint), "What the residual depends on: means over bins."),
-    ]
+    return {
+        "Measured and simulated angle, and their difference.": _angles(joint),
+        "Residuals on the measured motion, before and after.": _residuals(joint),
+        "What the residual depends on: means over bins.": _features(joint),
+    }
+
+
+def _pictures(one: Examined) -> list[Picture]:
+    return [picture(drawn, words) for words, drawn in diagnosis_figures(one).items()]
 
 
 def _joint(one: Examined) -> _Joint:

@@ -1,6 +1,6 @@
 """Figures of an evaluation and of training: one function each, returning the Figure."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import matplotlib as mpl
@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import EngFormatter
 
 from envs.hand.nominal import FINGERS
 
@@ -33,7 +34,7 @@ STYLE: Any = {
 
 
 def gait_diagram(
-    contact: Bool[np.ndarray, "T 5"], dt_s: float, title: str = "Gait diagram"
+    contact: Bool[np.ndarray, "T tips"], dt_s: float, title: str = "Gait diagram"
 ) -> Figure:
     """Draws a bar for every stretch of contact of each fingertip with the ground.
 
@@ -43,7 +44,7 @@ def gait_diagram(
         title: of the figure.
     """
     figure, (axes,) = panels_of(1, (7.6, 2.3))
-    for tip, (name, colour) in enumerate(zip(FINGERS, FINGER_COLOURS, strict=True)):
+    for tip, (name, colour) in _tips(contact):
         edges = np.flatnonzero(np.diff(contact[:, tip], prepend=False, append=False))
         bars = [((a * dt_s), (b - a) * dt_s) for a, b in edges.reshape(-1, 2)]
         axes.broken_barh(bars, (tip - 0.36, 0.72), color=colour)
@@ -51,14 +52,17 @@ def gait_diagram(
         axes.text(1.01, tip, f"{share:.0f} %", transform=_row(axes), va="center")
         axes.text(-0.01, tip, name, transform=_row(axes), va="center", ha="right")
     axes.set(
-        xlim=(0, max(len(contact), 1) * dt_s), ylim=(4.6, -0.6), yticks=[], title=title
+        xlim=(0, max(len(contact), 1) * dt_s),
+        ylim=(contact.shape[1] - 0.4, -0.6),
+        yticks=[],
+        title=title,
     )
     axes.set_xlabel("time [s]     (right: share of time in contact)")
     return figure
 
 
 def foot_trajectories(
-    tip_pos_v: Float[np.ndarray, "T 5 3"], contact: Bool[np.ndarray, "T 5"]
+    tip_pos_v: Float[np.ndarray, "T tips 3"], contact: Bool[np.ndarray, "T tips"]
 ) -> Figure:
     """Draws each fingertip's path from the side (x, z) and from above (x, y).
 
@@ -69,7 +73,7 @@ def foot_trajectories(
         contact: which tips touch, per control step.
     """
     figure, (side, top) = panels_of(2, (7.6, 3.4))
-    for tip, (name, colour) in enumerate(zip(FINGERS, FINGER_COLOURS, strict=True)):
+    for tip, (name, colour) in _tips(contact):
         path = 1000 * tip_pos_v[:, tip]
         stance = np.where(contact[:, tip, None], path, np.nan)
         for axes, row in ((side, 2), (top, 1)):
@@ -83,6 +87,15 @@ def foot_trajectories(
     handles, labels = top.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
     return figure
+
+
+def _tips(
+    contact: Bool[np.ndarray, "T tips"],
+) -> Iterable[tuple[int, tuple[str, str]]]:
+    """Each fingertip's place with its name and colour."""
+    count = contact.shape[1]
+    named = zip(FINGERS[:count], FINGER_COLOURS[:count], strict=True)
+    return enumerate(named)
 
 
 def tracking(columns: Mapping[str, Float[np.ndarray, " episodes"]]) -> Figure:
@@ -159,6 +172,8 @@ def training_curves(
             points = [(row[x], row[key]) for row in rows if key in row and x in row]
             axes.plot(*np.reshape(points, (-1, 2)).T, color=colour, lw=1.6, label=name)
         axes.set(xlabel="environment steps", ylabel=label)
+        axes.xaxis.set_major_formatter(EngFormatter(sep=" "))
+        axes.locator_params(axis="x", nbins=5)
     if len(runs) > 1:
         panels[0].legend()
     return figure

@@ -10,7 +10,6 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.nominal import vendor_hand
 from fingers_deploy import Bundle, load_bundle
 from fingers_deploy.manifest import Interface, Term
 from fingers_mjx.policy.actor import read, warm_started
@@ -53,7 +52,7 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
         noise = {k: v for k, v in fresh.items() if k not in _LAYERS}
         policy = {**found.params.policy, "params": {**params, **noise}}
         return _with_policy(found, policy)
-    bundle = load_bundle(path, vendor_hand().joint_names)
+    bundle = load_bundle(path, env.hand.nominal.joint_names)
     theirs, ours = bundle.manifest.interface, interface_of(env)
     rows = _rows(theirs, ours)
     gain = theirs.action.scale_rad / ours.action.scale_rad

@@ -20,7 +20,6 @@ from scipy.stats import t as student
 
 from envs.errors import InputError, one_of
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import vendor_hand
 from envs.hand.quantity import JointQuantity, Quantity
 from sysid.calibration.friction import Pull, is_pull, pull_of
 from sysid.calibration.joint import JointFit, fit_joint
@@ -185,7 +184,7 @@ def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
     Joints that were not measured keep stiffness, damping and speed.
     """
     source = f"identified from {found.digest}"
-    names, changes = vendor_hand().joint_names, {}
+    names, changes = hand.nominal.joint_names, {}
     gains = {"stiffness_scale": "stiffness", "damping_scale": "damping"}
     fits = {j: f for j, f in found.joints.items() if j in names}
     for field, parameter in gains.items():
@@ -206,8 +205,8 @@ def calibrated_hand(hand: HandFile, found: Calibration) -> HandFile:
 def _per_joint(
     old: JointQuantity, names, fits, parameter: str, source: str, factor: bool
 ) -> JointQuantity:
-    """A parameter of 20 joints, of which some were measured."""
-    was = old.per_joint()
+    """A parameter of all joints, of which some were measured."""
+    was = old.per_joint(names)
     value, low, high = (dict(zip(names, was.tolist(), strict=True)) for _ in range(3))
     measured = []
     for joint, fit in fits.items():

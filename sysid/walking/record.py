@@ -16,10 +16,11 @@ from envs.batch import BatchEnv
 from envs.errors import InputError
 from envs.hand.drive.servo import servo_drive
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.nominal import vendor_hand
 from sysid.logs.log import MeasuredLog
 
 _AXES = ("x", "y", "z")
+JOINTS = 20
+"""Of the hand whose effects the hypotheses name."""
 _WINDOW, _ORDER = 5, 2
 _LEAST_S = 10.0
 _UNEVEN = 0.05
@@ -40,9 +41,9 @@ class WalkRecord:
     """
 
     dt: float
-    qpos: Float[np.ndarray, "n 27"]
-    qvel: Float[np.ndarray, "n 26"]
-    command: Float[np.ndarray, "n s 20"]
+    qpos: Float[np.ndarray, "n nq"]
+    qvel: Float[np.ndarray, "n nv"]
+    command: Float[np.ndarray, "n s joints"]
     gravity: Float[np.ndarray, "n 3"]
     gyro: Float[np.ndarray, "n 3"]
     turning: Float[np.ndarray, "n 3"]
@@ -59,7 +60,10 @@ def walk_record(log: MeasuredLog, env: BatchEnv) -> WalkRecord:
         InputError: a hand on a stand, other joints than the hand's, rows that are
             uneven or missing, columns that a walk needs, or too short a walk.
     """
-    names = vendor_hand().joint_names
+    names = env.spec.joints
+    if len(names) != JOINTS:
+        valid = f"{JOINTS}, of the hand whose effects a walk is searched for"
+        raise InputError("hand file", "description", f"{len(names)} joints", valid)
     if log.header.mounting != "free":
         valid = "free: a hand that walks"
         raise InputError(log.source, "mounting", log.header.mounting, valid)
@@ -129,7 +133,7 @@ def _turned_back(q: np.ndarray, rate: np.ndarray) -> np.ndarray:
     return w * du - dw * u - np.cross(u, du)
 
 
-def _commands(env: BatchEnv, targets: np.ndarray) -> Float[np.ndarray, "n s 20"]:
+def _commands(env: BatchEnv, targets: np.ndarray) -> Float[np.ndarray, "n s joints"]:
     """What the command path makes of the targets; before the log it had rested."""
     drive = servo_drive(env.hand, env.plant.n_substeps, PHYSICS_DT_S)
     begin = drive.begin(jnp.asarray(targets[0], jnp.float32))

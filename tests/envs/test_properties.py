@@ -59,7 +59,7 @@ def test_joints_by_name_are_joints_in_order(count):
     def check(order, values):
         named = {JOINTS[i]: float(values[i]) for i in order}
         quantity = JointQuantity(named, "1", "user")
-        np.testing.assert_array_equal(quantity.per_joint(), values.astype(float))
+        np.testing.assert_array_equal(quantity.per_joint(JOINTS), values.astype(float))
 
     finite = arrays(np.float32, 20, elements=st.floats(-1e6, 1e6, width=32))
     holds(count, check, st.permutations(range(20)), finite)

@@ -20,7 +20,7 @@ HAND = load_hand_file()
 MODEL = build_model(HAND)
 SPEC = hand_spec(MODEL)
 KEY = jax.random.key(20260111)
-NOMINAL = draw_variation(KEY, no_randomization(HAND.tip_friction.value))
+NOMINAL = draw_variation(KEY, no_randomization(HAND.tip_friction.value), 20)
 LOADED = {"payload_mass_scale": (0.5, 1.0)}
 
 
@@ -28,7 +28,7 @@ LOADED = {"payload_mass_scale": (0.5, 1.0)}
 def draws():
     print("seed 20260111")
     keys, config = jax.random.split(KEY, 4000), RandomizeConfig(**LOADED)
-    return jax.vmap(lambda key: draw_variation(key, config))(keys)
+    return jax.vmap(lambda key: draw_variation(key, config, 20))(keys)
 
 
 @pytest.mark.parametrize(
@@ -80,8 +80,8 @@ WIDER = {
 @pytest.mark.parametrize("name", WIDER)
 def test_another_range_moves_no_other_draw(name):
     config = dataclasses.replace(RandomizeConfig(), **WIDER[name])
-    before = vars(draw_variation(KEY, RandomizeConfig()))
-    after = vars(draw_variation(KEY, config))
+    before = vars(draw_variation(KEY, RandomizeConfig(), 20))
+    after = vars(draw_variation(KEY, config, 20))
     moved = {k for k in before if not np.array_equal(before[k], after[k])}
     assert moved == {name}
 

@@ -15,11 +15,12 @@ from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import build_spec
 from envs.hand.nominal import vendor_hand
-from envs.hand.spec import HAND_NQ, HAND_NV, hand_spec
+from envs.hand.spec import hand_spec
 from envs.hand.stance import load_stance
 from envs.scene import build_scene
 from envs.tasks.crawl import Crawl, CrawlConfig
 
+HAND_NQ, HAND_NV = 27, 26
 HAND, Q_OFF = load_hand_file(), load_stance().q_off
 
 

@@ -11,7 +11,7 @@ import pytest
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, V_SITE, build_model
 from envs.hand.nominal import FINGERS, vendor_hand
-from envs.hand.spec import OTHER_LINKS, TIP_SPHERES, hand_spec
+from envs.hand.spec import hand_spec
 from envs.hand.stance import load_stance
 from envs.physics import PhysicsOutput, PhysicsState
 from envs.signals import Command, extract_signals, tilt
@@ -134,7 +134,7 @@ def floor_force(data, geom):
 
 def test_tip_forces_are_those_of_the_contact_list(moving):
     signals = read(moving)
-    expected = [np.linalg.norm(floor_force(moving, link)) for link in TIP_SPHERES]
+    expected = [np.linalg.norm(floor_force(moving, link)) for link in SPEC.tip_spheres]
     np.testing.assert_allclose(signals.tip_force_n, expected, rtol=1e-5, atol=1e-6)
     assert np.max(expected) > 1.0
 
@@ -144,7 +144,7 @@ def test_at_rest_the_tips_carry_the_weight():
     data.qpos[:], data.ctrl[:] = STANCE.qpos, STANCE.target_rad
     mujoco.mj_step(MODEL, data, 400)
     read(data)
-    lifted = sum(abs(floor_force(data, link)[2]) for link in TIP_SPHERES)
+    lifted = sum(abs(floor_force(data, link)[2]) for link in SPEC.tip_spheres)
     assert lifted == pytest.approx(MODEL.body_subtreemass[1] * 9.81, rel=1e-3)
 
 
@@ -166,7 +166,7 @@ def test_contacts_of_a_hand_lying_on_the_floor(turn_deg):
     data.qpos[2] = 0.15
     mujoco.mj_step(MODEL, data, 200)
     signals, down = read(data), touching(data)
-    expected = [float(link in down) for link in OTHER_LINKS]
+    expected = [float(link in down) for link in SPEC.other_links]
     np.testing.assert_array_equal(signals.link_contact, expected)
     assert signals.palm_contact == float(bool({PALM, PAYLOAD} & down))
     if turn_deg in (0, 180):
@@ -216,7 +216,7 @@ def test_heading_and_place_change_nothing_in_v(moving):
 
 
 def test_names_follow_the_order_of_the_description():
-    assert len(OTHER_LINKS) == 10 and len(TIP_SPHERES) == 5
+    assert len(SPEC.other_links) == 10 and len(SPEC.tip_spheres) == 5
     assert [link.joint for link in vendor_hand().links] == [
         MODEL.actuator(i).name for i in range(20)
     ]

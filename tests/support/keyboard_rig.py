@@ -12,7 +12,7 @@ import numpy as np
 from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import PHYSICS_DT_S
-from envs.hand.spec import HAND_NQ, TIP_LINKS
+from envs.hand.nominal import vendor_hand
 from envs.scene import build_scene
 from envs.tasks.keyboard.model import (
     ACTUATION_M,
@@ -33,6 +33,8 @@ from envs.tasks.keyboard.stance import (
 )
 from fingers_robot.simulator.command_path import CommandPath
 
+TIP_LINKS = tuple(link.body for link in vendor_hand().tip_links)
+HAND_NQ = 27
 LIFT_M = 0.010
 STEP_RAD = KeyboardConfig().action_scale_rad
 SUBSTEPS = 4

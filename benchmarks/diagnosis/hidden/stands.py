@@ -121,13 +121,13 @@ def _finger(finger: int, rng: np.random.Generator, lowpass_hz: float):
         )
         joints.append(
             Joint(
-                kp=link.kp * hand.stiffness_scale.per_joint()[i],
-                kd=link.kv * hand.damping_scale.per_joint()[i],
+                kp=link.kp * hand.per_joint("stiffness_scale")[i],
+                kd=link.kv * hand.per_joint("damping_scale")[i],
                 armature=link.armature,
                 delay_s=hand.delay_s.value,
                 lowpass_hz=lowpass_hz,
-                slew_rad_s=float(hand.speed_limit.per_joint()[i]),
-                limit_nm=link.force_limit * hand.torque_scale.per_joint()[i],
+                slew_rad_s=float(hand.per_joint("speed_limit")[i]),
+                limit_nm=link.force_limit * hand.per_joint("torque_scale")[i],
             )
         )
         low, high = link.range_rad

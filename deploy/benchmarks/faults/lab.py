@@ -166,7 +166,7 @@ class Lab:
             interface.joint_names,
             chain.delay_s,
             chain.lowpass_hz,
-            chain.slews_rad_s,
+            interface.slews_rad_s,
             seed,
         )
         self.driver = LabDriver(hand, bundles[0], self.clock)

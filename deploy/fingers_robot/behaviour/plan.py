@@ -12,9 +12,9 @@ import numpy as np
 
 from fingers_deploy.errors import InputError
 from fingers_deploy.files import read_regular
-from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_deploy.manifest import Interface
 from fingers_robot.behaviour.exchange import Answer, Query, padded, propose
-from fingers_robot.reading import Array
+from fingers_robot.reading import JOINT_COUNT, Array
 from fingers_robot.safety.motion import toward
 
 _MAX_BYTES = 64 * 2**20

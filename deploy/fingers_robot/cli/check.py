@@ -78,7 +78,7 @@ def _describe(bundle: Bundle) -> None:
     )
     print(
         f"trained with    delay {1e3 * chain.delay_s:g} ms, low-pass "
-        f"{chain.lowpass_hz} Hz, joint speed {_speeds(chain.slews_rad_s)}"
+        f"{chain.lowpass_hz} Hz, joint speed {_speeds(interface.slews_rad_s)}"
     )
     print(f"joints          {', '.join(interface.joint_names)}")
 

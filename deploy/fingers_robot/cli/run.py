@@ -5,9 +5,9 @@ import contextlib
 import math
 from typing import Any
 
-from fingers_deploy.bundle import load_bundle
-from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_deploy.bundle import Bundle, load_bundle
+from fingers_deploy.errors import BundleError, InputError
+from fingers_deploy.manifest import Interface
 from fingers_robot.behaviour.joystick import QUIET_S
 from fingers_robot.behaviour.keyboard.keys import ARROWS
 from fingers_robot.behaviour.plan import read_plan
@@ -18,6 +18,7 @@ from fingers_robot.cli.speaker import Speaker
 from fingers_robot.drivers.open import KINDS
 from fingers_robot.drivers.outside import outside_kinds
 from fingers_robot.drivers.sim import SimulatorProcess, where_the_palm_is
+from fingers_robot.reading import JOINT_COUNT
 from fingers_robot.record.log import read_log
 from fingers_robot.runtime.guard import guard_hand
 from fingers_robot.runtime.launcher import EXIT_UNKNOWN
@@ -95,11 +96,21 @@ def add_guard(commands: Any) -> None:
     parser.set_defaults(command=guard)
 
 
+def _check_joints(bundle: Bundle) -> None:
+    """Refuses a policy of another hand than the one that this side drives."""
+    found = len(bundle.manifest.interface.joint_names)
+    if found != JOINT_COUNT:
+        where, valid = "interface.joint_names", f"{JOINT_COUNT}, the joints of the hand"
+        raise BundleError(bundle.source, where, f"{found} joints", valid)
+
+
 def run(options: argparse.Namespace) -> int:
     """Runs or records; returns the exit status."""
     check_options(options)
     # Refused here, before any process starts and any device is opened.
     bundles = [load_bundle(path) for path in options.bundles]
+    for bundle in bundles:
+        _check_joints(bundle)
     if options.with_sources:
         check_sources(options, bundles)
     if options.driver == "replay":

@@ -131,7 +131,7 @@ def server_arguments(path: str, interface: Interface, seed: int) -> list[str]:
         f"--joints={','.join(interface.joint_names)}",
         f"--delay-s={chain.delay_s}",
         f"--lowpass-hz={chain.lowpass_hz or 1e6}",
-        f"--slew-rad-s={','.join(map(repr, chain.slews_rad_s))}",
+        f"--slew-rad-s={','.join(map(repr, interface.slews_rad_s))}",
         f"--seed={seed}",
         f"--parent={os.getpid()}",
     ]

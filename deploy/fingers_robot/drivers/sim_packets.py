@@ -5,7 +5,7 @@ import enum
 import numpy as np
 from numpy.typing import NDArray
 
-from fingers_deploy.manifest import JOINT_COUNT
+from fingers_robot.reading import JOINT_COUNT
 
 
 class Ask(enum.IntEnum):

@@ -20,10 +20,17 @@ from typing import Any
 import numpy as np
 
 from fingers_deploy.errors import InputError
-from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_deploy.manifest import Interface
 from fingers_robot.drivers.protocol import Imu
 from fingers_robot.drivers.slow_path import SlowPath
-from fingers_robot.reading import Array, DriverInfo, Health, ImuReading, Reading
+from fingers_robot.reading import (
+    JOINT_COUNT,
+    Array,
+    DriverInfo,
+    Health,
+    ImuReading,
+    Reading,
+)
 
 EFFORT_LIMIT_A = 1.0
 LOWPASS_HZ = 3.0

@@ -7,7 +7,7 @@ fields, because they come in the order of their alignment.
 
 import numpy as np
 
-from fingers_deploy.manifest import JOINT_COUNT
+from fingers_robot.reading import JOINT_COUNT
 
 SCHEMA_VERSION = 1
 SCHEMA_NAME = "fingers_msgs/msg/LogRow"

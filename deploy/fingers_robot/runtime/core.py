@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from fingers_deploy.manifest import JOINT_COUNT, Interface
+from fingers_deploy.manifest import Interface
 from fingers_deploy.rotations import gravity
 from fingers_robot.behaviour.exchange import COMMANDS, Answer, Query
 from fingers_robot.drivers.protocol import Driver
-from fingers_robot.reading import Health, ImuReading, Reading
+from fingers_robot.reading import JOINT_COUNT, Health, ImuReading, Reading
 from fingers_robot.record.row import empty_row
 from fingers_robot.runtime.preflight import Check, preflight
 from fingers_robot.runtime.stats import LoopStats

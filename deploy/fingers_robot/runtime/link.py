@@ -5,8 +5,8 @@ import socket
 
 import numpy as np
 
-from fingers_deploy.manifest import JOINT_COUNT
 from fingers_robot.behaviour.exchange import COMMANDS, Answer, Query
+from fingers_robot.reading import JOINT_COUNT
 from fingers_robot.safety.types import PolicyFault, Proposal
 from fingers_robot.waiting import EVERY, waiting
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingers_deploy.manifest import JOINT_COUNT
-from fingers_robot.reading import Array
+from fingers_robot.reading import JOINT_COUNT, Array
 from fingers_robot.safety.limits import Limits
 from fingers_robot.safety.motion import ramp_duration, smooth_ramp
 from fingers_robot.safety.types import Inputs

@@ -19,9 +19,8 @@ from envs.actuator.effect import EffectKind, Params, Substep
 from envs.actuator.surroundings import Surroundings
 from envs.hand.effect_parts import load_sensor
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import vendor_hand
 from envs.hand.places import joints_at
-from envs.hand.spec import JOINT_QPOS, JOINT_QVEL, hand_spec
+from envs.hand.spec import HandSpec, hand_spec
 from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
 
 LIMIT = "torque_limit"
@@ -40,9 +39,9 @@ class ChainState:
     """
 
     effects: tuple[Any, ...]
-    reading: Float[Array, "*b 20"]
-    effort: Float[Array, "*b 20"]
-    load: Float[Array, "*b 20"]
+    reading: Float[Array, "*b joints"]
+    effort: Float[Array, "*b joints"]
+    load: Float[Array, "*b joints"]
 
 
 @dataclass(frozen=True)
@@ -52,12 +51,13 @@ class ChainDrive:
     Attributes:
         kinds: the command path and the limit of every hand, and its own effects, in the
             order of the catalogue.
-        params: their parameters per joint (20); where a hand does not have an effect,
+        params: their parameters per joint; where a hand does not have an effect,
             those at which it vanishes. The limit takes its own from the model.
         other: index of the joint that each joint is coupled to.
         load_sensors: where the sensors report the torques of the links on the joints;
             none if no effect depends on them.
         nominal: the model, for fields that are not given.
+        spec: its indices.
         n_substeps: physics steps of a control step.
         dt: substep [s].
     """
@@ -67,6 +67,7 @@ class ChainDrive:
     other: tuple[int, ...]
     load_sensors: tuple[slice, ...]
     nominal: mujoco.MjModel
+    spec: HandSpec
     n_substeps: int
     dt: float
 
@@ -75,7 +76,9 @@ class ChainDrive:
         """One in each substep: torques depend on angle and speed."""
         return self.n_substeps
 
-    def begin(self, target: Float[Array, "20"], q: Float[Array, "20"]) -> ChainState:
+    def begin(
+        self, target: Float[Array, " joints"], q: Float[Array, " joints"]
+    ) -> ChainState:
         """The chain at rest, in which no signal changes: ẋ = 0.
 
         Args:
@@ -85,8 +88,8 @@ class ChainDrive:
         Source:
             Ours: an episode starts without a transient of filters.
         """
-        none = jnp.zeros(20)
-        model = self._model(jnp.inf * jnp.ones(20))
+        none = jnp.zeros(q.shape)
+        model = self._model(jnp.inf * jnp.ones(q.shape))
         states = init_states(model, target, q, self.dt)
         rest = ChainState(effects=states, reading=q, effort=none, load=none)
         joint = JointInput(target, q, none, around=self._around(rest, q))
@@ -98,8 +101,8 @@ class ChainDrive:
         drive: ChainState,
         fields: ModelFields,
         state: PhysicsState,
-        target: Float[Array, "20"],
-    ) -> tuple[ChainState, ModelFields, Float[Array, "1 20"]]:
+        target: Float[Array, " joints"],
+    ) -> tuple[ChainState, ModelFields, Float[Array, "1 joints"]]:
         """Runs `chain_step` for one substep: (x, target, q, q̇) ↦ (x', τ, F, b, d, I).
 
         Args:
@@ -117,15 +120,17 @@ class ChainDrive:
         Source:
             Ours: the chain of identification and the one of training are the same code.
         """
-        q, qd = state.qpos[JOINT_QPOS], state.qvel[JOINT_QVEL]
+        qpos, qvel = self.spec.joint_qpos, self.spec.joint_qvel
+        q, qd = state.qpos[qpos], state.qvel[qvel]
         gain, bias = (fields[f"actuator_{name}prm"] for name in ("gain", "bias"))
         model = self._model(fields["actuator_forcerange"][:, 1])
-        rotor = jnp.asarray(self.nominal.dof_armature[JOINT_QVEL], jnp.float32)
+        rotor = jnp.asarray(self.nominal.dof_armature[qvel], jnp.float32)
         around = self._around(drive, q).replace(inertia=rotor)
         joint = JointInput(target, q, qd, drive.load, gain[:, 0], -bias[:, 2], around)
         states, x = chain_step(model, drive.effects, joint, self.dt)
         drive = drive.replace(effects=states, reading=x.reading, effort=x.effort)
-        return drive, _applied(fields, self.nominal, x), jnp.zeros((1, 20))
+        changed = _applied(fields, self.nominal, qvel, x)
+        return drive, changed, jnp.zeros((1, q.size))
 
     def observe(self, drive: ChainState, output: PhysicsOutput) -> ChainState:
         """Takes the load on the joints from the sensors of the last substep."""
@@ -134,7 +139,9 @@ class ChainDrive:
         held = [output.sensordata[at][1] for at in self.load_sensors]
         return drive.replace(load=-jnp.stack(held))
 
-    def reading(self, drive: ChainState, q: Float[Array, "20"]) -> Float[Array, "20"]:
+    def reading(
+        self, drive: ChainState, q: Float[Array, " joints"]
+    ) -> Float[Array, " joints"]:
         """What the chain computed in its last substep, old and with encoder errors.
 
         y = x.reading of `chain_step` [rad].
@@ -151,7 +158,7 @@ class ChainDrive:
         params[first] = {"limit_nm": limit_nm}
         return tuple(zip(self.kinds, params, strict=True))
 
-    def _around(self, drive: ChainState, q: Float[Array, "20"]) -> Surroundings:
+    def _around(self, drive: ChainState, q: Float[Array, " joints"]) -> Surroundings:
         """What the other joints did in the last substep."""
         size, other = jnp.abs(drive.effort), jnp.array(self.other)
         return Surroundings(
@@ -175,24 +182,28 @@ def chain_drive(
     own = {e.name for e in hand.effects if in_chain(CATALOGUE[e.name])}
     if not own:
         return None
+    count = len(hand.nominal.links)
     base = {
-        "transport_delay": {"delay_s": np.full(20, hand.delay_s.value)},
-        "lowpass_cutoff": {"cutoff_hz": np.full(20, hand.lowpass_hz.value)},
-        "slew_limit": {"speed_rad_s": hand.speed_limit.per_joint()},
-        LIMIT: {"limit_nm": np.full(20, np.inf)},
+        "transport_delay": {"delay_s": np.full(count, hand.delay_s.value)},
+        "lowpass_cutoff": {"cutoff_hz": np.full(count, hand.lowpass_hz.value)},
+        "slew_limit": {"speed_rad_s": hand.per_joint("speed_limit")},
+        LIMIT: {"limit_nm": np.full(count, np.inf)},
     }
     links = []
     for name, kind in CATALOGUE.items():
         links += [(kind, base[name])] if name in base else []
         links += [(kind, joint_params(hand, name))] if name in own else []
-    sensors, names = hand_spec(model).sensors, vendor_hand().joint_names
+    spec = hand_spec(model)
     uses_load = any(kind.uses_load for kind, _ in links)
     return ChainDrive(
         kinds=tuple(kind for kind, _ in links),
         params=tuple(float32(params) for _, params in links),
         other=_others(hand),
-        load_sensors=tuple(sensors[load_sensor(n)] for n in names if uses_load),
+        load_sensors=tuple(
+            spec.sensors[load_sensor(n)] for n in spec.joints if uses_load
+        ),
         nominal=model,
+        spec=spec,
         n_substeps=n_substeps,
         dt=dt,
     )
@@ -203,7 +214,7 @@ def in_chain(kind: EffectKind) -> bool:
     return bool(kind.acts) and kind.changes_model is None
 
 
-def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, "20"]]:
+def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, " joints"]]:
     """Parameters of an effect per joint; elsewhere the values at which it vanishes.
 
     θ_j = the file's value where the hand has the effect, else the identity's, in the
@@ -216,16 +227,19 @@ def joint_params(hand: HandFile, name: str) -> dict[str, Float[np.ndarray, "20"]
     Source:
         Ours: one program runs all joints, with or without the effect.
     """
-    found = {k: np.full(20, v) for k, v in CATALOGUE[name].identity().items()}
+    count = len(hand.nominal.links)
+    found = {k: np.full(count, v) for k, v in CATALOGUE[name].identity().items()}
     for effect in hand.effects:
         if effect.name == name:
-            at = list(joints_at(effect.where))
+            at = list(joints_at(hand.nominal, effect.where))
             for key, quantity in effect.parameters.items():
                 found[key][at] = quantity.value
     return found
 
 
-def _applied(fields: ModelFields, nominal: mujoco.MjModel, x: Substep) -> ModelFields:
+def _applied(
+    fields: ModelFields, nominal: mujoco.MjModel, joints: slice, x: Substep
+) -> ModelFields:
     """Model fields that make the physics apply the signals of a substep.
 
     The actuator's force is τ − d (q̇' − q̇), with the damping d taken implicitly.
@@ -241,24 +255,24 @@ def _applied(fields: ModelFields, nominal: mujoco.MjModel, x: Substep) -> ModelF
         "actuator_gainprm": jnp.zeros_like(given("actuator_gainprm")),
         "actuator_biasprm": bias.at[:, 0].set(constant).at[:, 2].set(-x.damping),
         "actuator_forcerange": jnp.broadcast_to(
-            jnp.array([-_UNLIMITED_NM, _UNLIMITED_NM]), (20, 2)
+            jnp.array([-_UNLIMITED_NM, _UNLIMITED_NM]), (nominal.nu, 2)
         ),
-        "dof_damping": given("dof_damping").at[JOINT_QVEL].add(x.viscous),
-        "dof_armature": jnp.maximum(armature.at[JOINT_QVEL].add(x.inertia), 0.0),
+        "dof_damping": given("dof_damping").at[joints].add(x.viscous),
+        "dof_armature": jnp.maximum(armature.at[joints].add(x.inertia), 0.0),
     }
-    if np.any(nominal.dof_frictionloss[JOINT_QVEL] > 0.0):
-        friction = given("dof_frictionloss").at[JOINT_QVEL].add(x.friction)
+    if np.any(nominal.dof_frictionloss[joints] > 0.0):
+        friction = given("dof_frictionloss").at[joints].add(x.friction)
         changed["dof_frictionloss"] = friction
     return changed
 
 
 def _others(hand: HandFile) -> tuple[int, ...]:
     """Partner of each joint; its own index where there is none."""
-    other = list(range(20))
+    other = list(range(len(hand.nominal.links)))
     for effect in hand.effects:
         if effect.other:
-            for joint in joints_at(effect.where):
-                other[joint] = joints_at((effect.other,))[0]
+            for joint in joints_at(hand.nominal, effect.where):
+                other[joint] = joints_at(hand.nominal, (effect.other,))[0]
     return tuple(other)
 
 

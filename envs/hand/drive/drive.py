@@ -26,7 +26,7 @@ class Drive(Protocol):
         """How often in a control step the drive acts on the state of the physics."""
         ...
 
-    def begin(self, target: Float[Array, "20"], q: Float[Array, "20"]) -> Any:
+    def begin(self, target: Float[Array, " joints"], q: Float[Array, " joints"]) -> Any:
         """The state of a drive at rest, in which nothing changes: ẋ = 0.
 
         Args:
@@ -43,8 +43,8 @@ class Drive(Protocol):
         drive: Any,
         fields: ModelFields,
         state: PhysicsState,
-        target: Float[Array, "20"],
-    ) -> tuple[Any, ModelFields, Float[Array, "substeps 20"]]:
+        target: Float[Array, " joints"],
+    ) -> tuple[Any, ModelFields, Float[Array, "substeps joints"]]:
         """Prepares a round: (x, target, q, q̇) ↦ (x', changed fields, controls).
 
         Args:
@@ -67,7 +67,9 @@ class Drive(Protocol):
         """Takes in what the physics made of a round."""
         ...
 
-    def reading(self, drive: Any, q: Float[Array, "20"]) -> Float[Array, "20"]:
+    def reading(
+        self, drive: Any, q: Float[Array, " joints"]
+    ) -> Float[Array, " joints"]:
         """Joint angles that the encoders report to the host: y = h(x, q) [rad].
 
         Args:

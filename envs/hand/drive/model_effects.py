@@ -15,7 +15,6 @@ from envs.errors import InputError
 from envs.hand.drive.chain import float32, joint_params
 from envs.hand.effect_parts import kinds_of, pair_name
 from envs.hand.hand_file import HandFile
-from envs.hand.nominal import FINGERS
 from envs.hand.places import fingers_at
 from envs.hand.spec import HandSpec
 from envs.physics.base import ModelFields, nominal_field
@@ -107,10 +106,11 @@ def _params(hand: HandFile, kind: EffectKind) -> dict[str, np.ndarray]:
     if kind.scope == "hand":
         (entry,) = entries
         return {k: np.array(q.value) for k, q in entry.parameters.items()}
-    found = {k: np.full(len(FINGERS), v) for k, v in kind.identity().items()}
+    count = len(hand.nominal.fingers)
+    found = {k: np.full(count, v) for k, v in kind.identity().items()}
     for entry in entries:
         for key, quantity in entry.parameters.items():
-            found[key][list(fingers_at(entry.where))] = quantity.value
+            found[key][list(fingers_at(hand.nominal, entry.where))] = quantity.value
     return found
 
 
@@ -123,7 +123,8 @@ def _check_payload(hand: HandFile, params: EffectParams) -> None:
 
 
 def _scene(model: mujoco.MjModel, spec: HandSpec) -> Scene:
-    spheres, links = spec.tip_geoms[:5], spec.tip_geoms[5:]
+    count = len(spec.fingers)
+    spheres, links = spec.tip_geoms[:count], spec.tip_geoms[count:]
     pairs = [model.pair(i).name for i in range(model.npair)]
     return Scene(
         nominal=model,
@@ -131,6 +132,6 @@ def _scene(model: mujoco.MjModel, spec: HandSpec) -> Scene:
         above_payload=(0, spec.palm_body, spec.payload_body),
         tip_geoms=tuple(zip(spheres, links, strict=True)),
         tip_pairs=tuple(
-            pairs.index(pair_name(f)) for f in FINGERS if pair_name(f) in pairs
+            pairs.index(pair_name(f)) for f in spec.fingers if pair_name(f) in pairs
         ),
     )

@@ -41,7 +41,7 @@ class CommandPath:
 
     delay_s: Float[Array, "*b"]
     lowpass_hz: Float[Array, "*b"]
-    speed_limit: Float[Array, "*b 20"]
+    speed_limit: Float[Array, "*b joints"]
 
 
 @flax.struct.dataclass
@@ -54,9 +54,9 @@ class CommandState:
         command: output of the speed limit, which the servo follows.
     """
 
-    targets: Float[Array, "*b slots 20"]
-    filtered: Float[Array, "*b 20"]
-    command: Float[Array, "*b 20"]
+    targets: Float[Array, "*b slots joints"]
+    filtered: Float[Array, "*b joints"]
+    command: Float[Array, "*b joints"]
 
 
 @dataclass(frozen=True)
@@ -79,7 +79,7 @@ class ServoDrive:
         return 1
 
     def begin(
-        self, target: Float[Array, "20"], q: Float[Array, "20"] | None = None
+        self, target: Float[Array, " joints"], q: Float[Array, " joints"] | None = None
     ) -> CommandState:
         """The command path at rest: x_k = y = c = target for all k [rad].
 
@@ -93,8 +93,8 @@ class ServoDrive:
         return CommandState(targets=targets, filtered=target, command=target)
 
     def commands(
-        self, drive: CommandState, target: Float[Array, "20"]
-    ) -> tuple[CommandState, Float[Array, "substeps 20"]]:
+        self, drive: CommandState, target: Float[Array, " joints"]
+    ) -> tuple[CommandState, Float[Array, "substeps joints"]]:
         """Commands of one control step: c_k = `command_step` of c_{k−1}, k ≤ n [rad].
 
         Args:
@@ -116,8 +116,8 @@ class ServoDrive:
         drive: CommandState,
         fields: ModelFields,
         state: PhysicsState,
-        target: Float[Array, "20"],
-    ) -> tuple[CommandState, ModelFields, Float[Array, "substeps 20"]]:
+        target: Float[Array, " joints"],
+    ) -> tuple[CommandState, ModelFields, Float[Array, "substeps joints"]]:
         """Commands of one control step: (x, target) ↦ (x', {}, c₁ … c_n) [rad].
 
         Source:
@@ -130,7 +130,9 @@ class ServoDrive:
         """Unchanged: nothing depends on the physics."""
         return drive
 
-    def reading(self, drive: CommandState, q: Float[Array, "20"]) -> Float[Array, "20"]:
+    def reading(
+        self, drive: CommandState, q: Float[Array, " joints"]
+    ) -> Float[Array, " joints"]:
         """Exact encoders without delay: y = q [rad].
 
         Source:
@@ -153,14 +155,14 @@ def servo_drive(hand: HandFile, n_substeps: int, dt: float) -> ServoDrive:
     if hand.delay_s.value > MAX_DELAY_S:
         found, valid = hand.delay_s.value, f"at most {MAX_DELAY_S:g} s"
         raise InputError("hand file", "delay_s.value", found, valid)
-    numbers = (hand.delay_s.value, hand.lowpass_hz.value, hand.speed_limit.per_joint())
+    numbers = (hand.delay_s.value, hand.lowpass_hz.value, hand.per_joint("speed_limit"))
     path = CommandPath(*(jnp.asarray(x, jnp.float32) for x in numbers))
     return ServoDrive(path, n_substeps, dt)
 
 
 def command_step(
-    path: CommandPath, state: CommandState, target: Float[Array, "20"], dt: float
-) -> tuple[CommandState, Float[Array, "20"]]:
+    path: CommandPath, state: CommandState, target: Float[Array, " joints"], dt: float
+) -> tuple[CommandState, Float[Array, " joints"]]:
     """Advances the command path by one substep.
 
     The formulas are those of the effects `transport_delay`, `lowpass_cutoff` and

@@ -8,7 +8,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import HandFile
 from envs.hand.importing.place import Placed
 from envs.hand.model import PALM, build_model
-from envs.hand.spec import TIP_SITES
+from envs.hand.spec import hand_spec
 
 TIP_ERROR_M = 1e-6
 MASS_ERROR_KG = 1e-9
@@ -47,22 +47,25 @@ def tip_error_m(placed: Placed, hand: HandFile, seed: int = 0) -> float:
         seed: of the angles, uniform within the joint ranges.
     """
     low, high = hand.nominal.per_joint("range_rad").T
-    angles = np.random.default_rng(seed).uniform(low, high, (POSES, 20))
+    angles = np.random.default_rng(seed).uniform(low, high, (POSES, len(low)))
     ours, theirs = _Ours(hand), _Theirs(placed, hand)
     return max(float(np.abs(ours.tips(q) - theirs.tips(q)).max()) for q in angles)
 
 
 class _Ours:
-    """Fingertips and pads of our model, in the palm [m] (10 × 3)."""
+    """Fingertips and pads of our model, in the palm [m] (2 n × 3)."""
 
     def __init__(self, hand: HandFile):
         self.model = build_model(hand)
+        self.sites = hand_spec(self.model).tip_sites
         self.data = mujoco.MjData(self.model)
 
-    def tips(self, angles: Float[np.ndarray, "20"]) -> Float[np.ndarray, "10 3"]:
+    def tips(
+        self, angles: Float[np.ndarray, " joints"]
+    ) -> Float[np.ndarray, "points 3"]:
         self.data.qpos[7:] = angles
         mujoco.mj_kinematics(self.model, self.data)
-        sites = [self.data.site(name) for name in TIP_SITES]
+        sites = [self.data.site(name) for name in self.sites]
         tips = np.array([site.xpos for site in sites])
         pads = tips + [_PAD_M * site.xmat.reshape(3, 3)[:, 0] for site in sites]
         palm = self.data.body(PALM)
@@ -76,18 +79,23 @@ class _Theirs:
         self.placed, self.data = placed, mujoco.MjData(placed.model)
         self.joints = placed.model.jnt_qposadr[placed.joints]
         self.palm = placed.model.body(placed.custom.palm).id
-        distal = range(3, 20, 4)
+        each = placed.each
+        distal = range(each - 1, len(placed.joints), each)
         frames = [placed.link_w(index) for index in distal]
         tips = [np.array(hand.nominal.links[index].tip) for index in distal]
         points = [f.pos + f.mat @ t for f, t in zip(frames, tips, strict=True)]
         pads = [p + _PAD_M * f.mat[:, 0] for f, p in zip(frames, points, strict=True)]
-        self.bodies = 2 * placed.model.jnt_bodyid[placed.joints][3::4].tolist()
+        self.bodies = (
+            2 * placed.model.jnt_bodyid[placed.joints][each - 1 :: each].tolist()
+        )
         self.points = [
             placed.data.xmat[body].reshape(3, 3).T @ (point - placed.data.xpos[body])
             for body, point in zip(self.bodies, points + pads, strict=True)
         ]
 
-    def tips(self, angles: Float[np.ndarray, "20"]) -> Float[np.ndarray, "10 3"]:
+    def tips(
+        self, angles: Float[np.ndarray, " joints"]
+    ) -> Float[np.ndarray, "points 3"]:
         self.data.qpos[self.joints] = angles
         mujoco.mj_kinematics(self.placed.model, self.data)
         points_w = np.array(

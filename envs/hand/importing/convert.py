@@ -7,7 +7,6 @@ fingertips at the same places and weigh the same.
 """
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,13 +17,14 @@ from jaxtyping import Float
 from envs.errors import InputError
 from envs.hand.hand_file import HandFile, load_hand_file
 from envs.hand.importing.check import check_same
-from envs.hand.importing.drive import ImportedDrive, drive_of
+from envs.hand.importing.drive import ImportedDrive, drive_of, own_drive_of
 from envs.hand.importing.inertia import (
     PALM_GROUP,
     PAYLOAD_GROUP,
     Inertia,
     inertia_of,
 )
+from envs.hand.importing.joint_map import JointMap
 from envs.hand.importing.load import load_custom_hand
 from envs.hand.importing.palm import Frame
 from envs.hand.importing.place import Placed, place
@@ -35,7 +35,7 @@ from envs.hand.importing.shape import (
     rounded,
     surface_points,
 )
-from envs.hand.nominal import NAMES, Capsule, Link, NominalHand, Palm, vendor_hand
+from envs.hand.nominal import Capsule, Link, NominalHand, Palm, vendor_hand
 from envs.hand.quantity import JointQuantity, Quantity, Vector
 
 COMPILE_CPU_S = 60
@@ -45,6 +45,8 @@ _SCALES = {
     "force_limit": "torque_scale",
 }
 _NO_PAYLOAD_M = 0.001
+LONG_M = 0.030
+"""Length from which a finger's first link counts as one that may touch something."""
 
 
 @dataclass(frozen=True)
@@ -62,35 +64,38 @@ class ImportedHand:
 
 def import_hand(
     path: str | Path,
-    joint_map: Mapping[str, str] | None = None,
-    palm_quat: tuple[float, ...] | None = None,
+    joint_map: JointMap | None = None,
 ) -> ImportedHand:
     """Makes a hand file of a user's MJCF.
 
     Args:
         path: main MJCF file; everything it names must lie in its folder.
-        joint_map: our joint name -> the model's, for those that differ.
-        palm_quat: our palm frame in the model's palm body, w x y z, where it does not
-            follow from the finger bases.
+        joint_map: the model's names of our joints where they differ, or its fingers.
 
     Returns:
         The hand file: the default one in what an MJCF does not hold (delay, filter,
         speed, friction).
 
     Raises:
-        InputError: as `load_custom_hand`; or the model is another hand than five
-            fingers of four links on a palm, arranged as the WUJI right hand's.
+        InputError: as `load_custom_hand`; or a map without fingers, and the model is
+            another hand than five fingers of four links on a palm, arranged as the WUJI
+            right hand's; or one with them, and the model lacks shapes or gains.
     """
-    custom = load_custom_hand(path, joint_map, COMPILE_CPU_S)
-    placed = place(custom, palm_quat)
+    given = joint_map or JointMap()
+    own = bool(given.fingers)
+    custom = load_custom_hand(path, given, COMPILE_CPU_S)
+    placed = place(custom, given.palm_quat, not own)
     actuators = [placed.model.actuator(name).id for name in custom.actuators]
-    drive = drive_of(placed.model, placed.joints, actuators)
-    shapes, shape_notes = _capsules(placed)
-    palm, palm_notes = _palm(placed)
+    where = (placed.model, placed.joints, actuators)
+    drive = own_drive_of(custom.path, *where, given.drive) if own else drive_of(*where)
+    shapes, shape_notes = _own_capsules(placed) if own else _capsules(placed)
+    palm, palm_notes = _palm(placed, own)
     links = tuple(
-        _link(placed, index, drive, shapes[index]) for index in range(len(NAMES))
+        _link(placed, index, drive, shapes[index]) for index in range(len(shapes))
     )
-    hand, hand_notes = _hand_file(placed, NominalHand(palm, links), drive)
+    speed = given.drive.speed_limit
+    nominal = NominalHand(palm, links)
+    hand, hand_notes = _hand_file(placed, nominal, drive, _speeds(own, speed))
     check_same(placed, hand)
     notes = (*custom.defaults, *drive.notes, *shape_notes, *palm_notes, *hand_notes)
     if placed.model.neq or placed.model.ntendon:
@@ -117,11 +122,31 @@ def _capsules(placed: Placed) -> tuple[list[Capsule | None], tuple[str, ...]]:
     return found, (note,) * bool(lacking)
 
 
-def _palm(placed: Placed) -> tuple[Palm, tuple[str, ...]]:
+def _own_capsules(placed: Placed) -> tuple[list[Capsule | None], tuple[str, ...]]:
+    """Capsules of all links but those whose finger goes on where they begin."""
+    found: list[Capsule | None] = []
+    for index, frame in enumerate(placed.links):
+        first = index % placed.each == 0
+        geoms = colliding_geoms(placed.model, placed.bodies[index])
+        if first and np.linalg.norm(placed.links[index + 1].pos - frame.pos) < LONG_M:
+            found.append(None)
+        elif geoms:
+            at = placed.link_w(index)
+            found.append(link_capsule(placed.model, placed.data, geoms, at))
+        else:
+            body = placed.model.body(placed.bodies[index][0]).name
+            valid = "a colliding geom on every link after a finger's first"
+            raise InputError(placed.custom.path, "", f"none on {body}", valid)
+    return found, ()
+
+
+def _palm(placed: Placed, own: bool) -> tuple[Palm, tuple[str, ...]]:
     bodies = placed.bodies[PALM_GROUP]
     inertia = _inertia(placed, bodies, placed.palm_w, "palm")
     geoms = colliding_geoms(placed.model, bodies)
     low, high = vendor_hand().palm.bounds_min, vendor_hand().palm.bounds_max
+    if own and not geoms:
+        raise InputError(placed.custom.path, "", "none", "a colliding geom on the palm")
     if geoms:
         points = surface_points(placed.model, placed.data, geoms, placed.palm_w)
         low, high = bounds(points)
@@ -134,9 +159,9 @@ def _palm(placed: Placed) -> tuple[Palm, tuple[str, ...]]:
 def _link(
     placed: Placed, index: int, drive: ImportedDrive, capsule: Capsule | None
 ) -> Link:
-    body, joint = NAMES[index]
+    body, joint = placed.custom.names[index]
     frame = placed.links[index]
-    if index % 4:
+    if index % placed.each:
         frame = placed.links[index - 1].inverse.of(frame)
     inertia = _inertia(placed, placed.bodies[index], placed.link_w(index), body)
     drives: dict[str, Any] = {
@@ -149,7 +174,7 @@ def _link(
         quat=_rounded(frame.quat),
         range_rad=_rounded(placed.model.jnt_range[placed.joints[index]]),
         capsule=capsule,
-        tip=capsule[1] if capsule and index % 4 == 3 else None,
+        tip=capsule[1] if capsule and (index + 1) % placed.each == 0 else None,
         **_inertial(inertia),
         **drives,
     )
@@ -173,12 +198,20 @@ def _inertial(inertia: Inertia) -> dict[str, Any]:
 
 
 def _hand_file(
-    placed: Placed, own: NominalHand, drive: ImportedDrive
+    placed: Placed,
+    own: NominalHand,
+    drive: ImportedDrive,
+    speeds: dict[str, JointQuantity],
 ) -> tuple[HandFile, tuple[str, ...]]:
     """The default hand file with what the model holds in the place of its own."""
     default, note = load_hand_file(), f"of {placed.custom.path.name}"
     scales = {
-        _SCALES[name]: JointQuantity(1.0, "1", "user", note=f"{name} is that {note}")
+        _SCALES[name]: JointQuantity(
+            1.0,
+            "1",
+            "user",
+            note=f"{name} is that {'of the map' if name in drive.mapped else note}",
+        )
         for name in drive.own & set(_SCALES)
     }
     kept = [field for name, field in _SCALES.items() if name not in drive.own]
@@ -193,8 +226,20 @@ def _hand_file(
         description=own,
         **payload,
         **scales,
+        **speeds,
     )
     return hand, notes
+
+
+def _speeds(own: bool, given: float | None) -> dict[str, JointQuantity]:
+    """The speed limit of a hand with joints of its own; else the default hand's."""
+    if not own:
+        return {}
+    if given is not None:
+        return {"speed_limit": JointQuantity(given, "rad/s", "user", note="of the map")}
+    lowest = float(load_hand_file().per_joint("speed_limit").min())
+    note = "the lowest of the default hand"
+    return {"speed_limit": JointQuantity(lowest, "rad/s", "ours", note=note)}
 
 
 def _payload(

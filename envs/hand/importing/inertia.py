@@ -1,4 +1,4 @@
-"""Mass and inertia of the rigid groups of a user's model: palm, payload, 20 links."""
+"""Mass and inertia of the rigid groups of a user's model: palm, payload, links."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from envs.hand.importing.palm import Frame
 from envs.hand.model import PAYLOAD
 
-PALM_GROUP, PAYLOAD_GROUP = 20, 21
+PALM_GROUP, PAYLOAD_GROUP = -1, -2
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def groups(
 
     Args:
         model: the user's.
-        links: bodies of the 20 hinges.
+        links: bodies of the hinges.
         palm: body that carries the fingers.
         root: topmost body of the hand.
 
@@ -53,7 +53,8 @@ def groups(
         elif parent in group and body not in group:
             loose = model.body(body).name == PAYLOAD and group[parent] == PALM_GROUP
             group[body] = PAYLOAD_GROUP if loose else group[parent]
-    found: dict[int, list[int]] = {index: [] for index in range(PAYLOAD_GROUP + 1)}
+    known = (*range(len(links)), PALM_GROUP, PAYLOAD_GROUP)
+    found: dict[int, list[int]] = {index: [] for index in known}
     for body, index in group.items():
         found[index].append(body)
     return found

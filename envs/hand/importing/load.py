@@ -11,16 +11,17 @@ import json
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from envs.errors import InputError, one_of
+from envs.errors import InputError
 from envs.hand.importing.files import TIMESTEP_S, check_files
-from envs.hand.nominal import FINGERS, vendor_hand
+from envs.hand.importing.joint_map import JointMap
+from envs.hand.nominal import FINGERS
 from envs.physics.quiet_mujoco import mujoco
 
 _CHILD = Path(__file__).with_name("child.py")
@@ -28,14 +29,15 @@ _CHILD = Path(__file__).with_name("child.py")
 
 @dataclass(frozen=True)
 class CustomHand:
-    """A user's hand; every tuple is in our order (20 joints, 5 fingers).
+    """A user's hand; every tuple is in our order, finger by finger.
 
     Attributes:
         path: the MJCF, links followed.
         spec: the model, not attached to anything; elements used below have names.
-        joints: names of the 20 hinges.
+        joints: names of the hinges.
+        names: our names of links and joints.
         actuators: name of the actuator of each joint; empty if the model has none.
-        palm: body that carries the five fingers.
+        palm: body that carries the fingers.
         root_joint: free joint of the hand, "" if it is fixed to the world.
         tip_bodies: distal body of each finger.
         tip_geoms: colliding geom of each distal body farthest from its joint.
@@ -45,6 +47,7 @@ class CustomHand:
     path: Path
     spec: mujoco.MjSpec
     joints: tuple[str, ...]
+    names: tuple[tuple[str, str], ...]
     actuators: tuple[str, ...]
     palm: str
     root_joint: str
@@ -55,14 +58,14 @@ class CustomHand:
 
 def load_custom_hand(
     path: str | Path,
-    joint_map: Mapping[str, str] | None = None,
+    joint_map: JointMap | None = None,
     cpu_limit_s: int = 4,
 ) -> CustomHand:
     """Loads a user's MJCF.
 
     Args:
         path: main MJCF file; everything it names must lie in its folder.
-        joint_map: our joint name -> the model's, for those that differ.
+        joint_map: the model's names of our joints, where they differ.
         cpu_limit_s: processor seconds the trial compilation may take; large meshes may
             need more.
 
@@ -73,7 +76,8 @@ def load_custom_hand(
         InputError: unsafe or malformed file, or a model that is not this hand; the
             sentence lists everything that is missing.
     """
-    names = _their_names(joint_map or {})
+    joint_map = joint_map or JointMap()
+    names = joint_map.names
     file = check_files(path)
     _compile_in_child(file, cpu_limit_s)
     spec = mujoco.MjSpec.from_file(str(file))
@@ -82,20 +86,7 @@ def load_custom_hand(
     low, high = TIMESTEP_S
     if not low <= model.opt.timestep <= high:
         raise InputError(path, "timestep", model.opt.timestep, f"{low:g} to {high:g} s")
-    return _resolve(file, spec, model, names)
-
-
-def _their_names(joint_map: Mapping[str, str]) -> tuple[str, ...]:
-    """Returns the model's names of our 20 joints."""
-    ours = vendor_hand().joint_names
-    for name in joint_map:
-        if name not in ours:
-            raise InputError("joint_map", str(name), name, one_of(ours, str(name)))
-    theirs = tuple(str(joint_map.get(name, name)) for name in ours)
-    twice = sorted({name for name in theirs if theirs.count(name) > 1})
-    if twice:
-        raise InputError("joint_map", "", f"{twice[0]} twice", "20 different joints")
-    return theirs
+    return _resolve(file, spec, model, names, joint_map.own_names)
 
 
 def _compile_in_child(path: Path, cpu_limit_s: int) -> None:
@@ -137,22 +128,27 @@ def _name_everything(spec: mujoco.MjSpec) -> None:
 
 
 def _resolve(
-    path: Path, spec: mujoco.MjSpec, model: mujoco.MjModel, names: tuple[str, ...]
+    path: Path,
+    spec: mujoco.MjSpec,
+    model: mujoco.MjModel,
+    names: tuple[str, ...],
+    own_names: tuple[tuple[str, str], ...],
 ) -> CustomHand:
     """Finds joints, actuators, palm and tips, or says all that is missing."""
     missing = [*_missing_joints(model, names), *_extra_joints(model, names)]
     if missing:
         raise _not_this_hand(path, model, missing)
     joints = [model.joint(name).id for name in names]
-    bodies = model.jnt_bodyid[joints].reshape(len(FINGERS), 4).tolist()
+    each = sum(body.startswith("finger1_") for body, _ in own_names)
+    bodies = model.jnt_bodyid[joints].reshape(-1, each).tolist()
     palm = _common_parent(
         model, [int(model.body_parentid[chain[0]]) for chain in bodies]
     )
-    tip_bodies = [chain[3] for chain in bodies]
+    tip_bodies = [chain[-1] for chain in bodies]
     tips = [_tip_geom(model, body) for body in tip_bodies]
     actuators, unmoved = _actuators(model, joints)
     if palm == 0:
-        missing.append("a palm body that carries the five fingers")
+        missing.append(f"a palm body that carries the {len(bodies)} fingers")
     missing += [
         f"a colliding geom on the tip body {model.body(body).name}"
         for body, tip in zip(tip_bodies, tips, strict=True)
@@ -169,6 +165,7 @@ def _resolve(
         path=path,
         spec=spec,
         joints=names,
+        names=own_names,
         actuators=actuators,
         palm=model.body(palm).name,
         root_joint=root,
@@ -211,7 +208,9 @@ def _extra_joints(model: mujoco.MjModel, names: Iterable[str]) -> list[str]:
     free, known = mujoco.mjtJoint.mjJNT_FREE, set(names)
     listed = [model.joint(i) for i in range(model.njnt)]
     extra = [j.name for j in listed if j.type[0] != free and j.name not in known]
-    return [f"no joints but the 20 of the hand, not {', '.join(extra)}"] * bool(extra)
+    return [
+        f"no joints but the {len(known)} of the hand, not {', '.join(extra)}"
+    ] * bool(extra)
 
 
 def _common_parent(model: mujoco.MjModel, bodies: Iterable[int]) -> int:
@@ -233,7 +232,7 @@ def _broken_chains(model: mujoco.MjModel, bodies: list[list[int]]) -> list[str]:
     """Sentences on fingers whose joints do not follow each other."""
     return [
         f"the joints of the {finger} one behind the other"
-        for finger, chain in zip(FINGERS, bodies, strict=True)
+        for finger, chain in zip(FINGERS, bodies, strict=False)
         if any(
             upper == lower or upper not in _ancestors(model, lower)
             for upper, lower in pairwise(chain)

@@ -61,17 +61,17 @@ def rotation(quat: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
 
 
 def frames_at_zero(hand: NominalHand) -> list[Frame]:
-    """Returns the 20 links in the palm with all joints at zero."""
+    """Returns the links in the palm with all joints at zero."""
     frames: list[Frame] = []
     for index, link in enumerate(hand.links):
         own = Frame(np.array(link.pos), rotation(np.array(link.quat)))
-        frames.append(own if index % 4 == 0 else frames[-1].of(own))
+        frames.append(own if index % hand.links_per_finger == 0 else frames[-1].of(own))
     return frames
 
 
 def palm_frame(
     path: Path,
-    anchors: Float[np.ndarray, "20 3"],
+    anchors: Float[np.ndarray, "joints 3"],
     palm_quat: tuple[float, ...] | None = None,
 ) -> Frame:
     """Finds our palm frame in the palm body of a user's model.
@@ -112,11 +112,11 @@ def palm_frame(
 
 def link_frames(
     path: Path,
-    anchors: Float[np.ndarray, "20 3"],
-    axes: Float[np.ndarray, "20 3"],
+    anchors: Float[np.ndarray, "joints 3"],
+    axes: Float[np.ndarray, "joints 3"],
     names: tuple[str, ...],
 ) -> list[Frame]:
-    """The 20 links in our palm frame at zero angles: y = hinge, x ∝ x₀ − (x₀ · y) y.
+    """The links in our palm frame at zero angles: y = hinge, x ∝ x₀ − (x₀ · y) y.
 
     x₀ is the vendor's x axis of the link.
 

@@ -64,7 +64,7 @@ def goal_offsets(
 
 def support_signals(
     signals: Signals,
-    tips_w: Float[Array, "5 3"],
+    tips_w: Float[Array, "tips 3"],
     start_w: Float[Array, "tips 2"],
     stance: Stance,
     limits: KeyboardConfig,

@@ -46,7 +46,7 @@ def keyboard_stance(hand: HandFile) -> Stance:
 
 
 def fingertip_v(
-    joint_pos: Float[Array, "20"], q_off: Float[Array, "4"]
+    joint_pos: Float[Array, " joints"], q_off: Float[Array, "4"]
 ) -> Float[Array, "3"]:
     """Centre of the pressing fingertip relative to the palm's origin, in V.
 

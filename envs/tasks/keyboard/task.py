@@ -12,7 +12,7 @@ from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
 from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.hand_file import HandFile
-from envs.hand.spec import HAND_NQ, JOINT_QPOS, TIP_LINKS
+from envs.hand.nominal import vendor_hand
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
@@ -97,8 +97,9 @@ class Keyboard(HandTask):
 
     def add_scene(self, spec: mujoco.MjSpec) -> None:
         """The keyboard."""
-        add_keyboard(spec, PLACEMENT, TIP_LINKS[FINGER_INDEX])
-        free_fingertip(spec, TIP_LINKS[FINGER_INDEX])
+        tip = vendor_hand().tip_links[FINGER_INDEX].body
+        add_keyboard(spec, PLACEMENT, tip)
+        free_fingertip(spec, tip)
 
     def vary_scene(
         self, plant: Plant, fields: ModelFields, world: PerWorldState
@@ -108,7 +109,7 @@ class Keyboard(HandTask):
 
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+    ) -> tuple[PhysicsState, Float[Array, " joints"]]:
         """The stance with noise, before a keyboard that is not quite aligned.
 
         The keyboard stays where it is in the world. The hand is turned by ψ about Down,
@@ -131,7 +132,7 @@ class Keyboard(HandTask):
             .set(root.at[:2].add(shift))
             .at[3:7]
             .set(multiply(about_z(turn), rest.qpos[3:7]))
-            .at[JOINT_QPOS]
+            .at[plant.spec.joint_qpos]
             .set(near_joints(key, plant, self.config.reset_joint_rad))
         )
         zero = jnp.zeros(plant.mj_model.nv)
@@ -189,7 +190,7 @@ class Keyboard(HandTask):
             Paper, keyboard pressing; the loss of stance is ours.
         """
         memory, draw = carried["task"], self._draw(carried["world"])
-        depth_m = output.state.qpos[HAND_NQ : HAND_NQ + len(KEY_NAMES)]
+        depth_m = output.state.qpos[plant.spec.nq :][: len(KEY_NAMES)]
         down, pressed = key_events(memory.down, depth_m, draw.actuation_m)
         requests, config = memory.requests, self.config
         outcome = judge(requests, pressed, config.requests, config.control_dt_s)

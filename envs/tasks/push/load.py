@@ -17,7 +17,7 @@ LAG_RAD, LAG_S = 0.5, 0.5
 
 def load_signals(
     plant: Plant, carried: Mapping[str, Any], signals: Signals, scale_rad: float
-) -> dict[str, Float[Array, "20"]]:
+) -> dict[str, Float[Array, " joints"]]:
     """How near its limit each joint is, |τ|/τ_max, and behind its target, |θ − q|.
 
     Args:
@@ -42,8 +42,8 @@ def load_signals(
 
 
 def stopped(
-    effort_share: Float[Array, "T 20"],
-    joint_lag_rad: Float[Array, "T 20"],
+    effort_share: Float[Array, "T joints"],
+    joint_lag_rad: Float[Array, "T joints"],
     counts: Bool[Array, " T"],
     dt_s: float,
 ) -> Float[Array, ""]:
@@ -69,7 +69,7 @@ def stopped(
     return (stall | lag).astype(jnp.float32)
 
 
-def _lasts(holds: Bool[Array, "T 20"], steps: float) -> Bool[Array, ""]:
+def _lasts(holds: Bool[Array, "T joints"], steps: float) -> Bool[Array, ""]:
     """Whether a condition holds for more than so many steps on end in some column."""
     number = round(steps) + 1
     total = jnp.cumsum(holds, axis=0)

@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.hand.spec import HAND_NQ, HAND_NV
 from envs.physics import PhysicsState
 from envs.rotations import about_z
 from envs.streams import stream
@@ -13,9 +12,8 @@ from envs.streams import stream
 CUBE = "cube"
 HALF_M = 0.020
 MASS_KG = 0.0414
-POS = slice(HAND_NQ, HAND_NQ + 3)
-VEL = slice(HAND_NV, HAND_NV + 3)
-"""Where position and velocity of the cube stand in `PhysicsState`."""
+POS, VEL = slice(-7, -4), slice(-6, -3)
+"""Where position and velocity of the cube stand in `PhysicsState`: after the hand's."""
 
 _AWAY_M = 0.5
 _COLOUR = (0.35, 0.55, 0.30, 1.0)
@@ -60,4 +58,4 @@ def place_cube(
     """
     turn = jax.random.uniform(stream(key, "cube_turn"), (), maxval=jnp.pi / 2)
     pose = jnp.concatenate([pos_w, jnp.array([HALF_M]), about_z(turn)])
-    return state.replace(qpos=state.qpos.at[HAND_NQ : HAND_NQ + 7].set(pose))
+    return state.replace(qpos=state.qpos.at[-7:].set(pose))

@@ -1,7 +1,7 @@
 """Object pushing: walk to a cube and push it to a target that is fixed in the world."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import flax.struct
@@ -74,18 +74,20 @@ class Push(Walking):
     Attributes:
         config: settings of the task.
         stance: settled stance of the hand, which defines V.
+        tips: fingertips of the hand.
         table: rows of the reward.
     """
 
     config: PushConfig
     stance: Stance
+    tips: int = field(default=5, kw_only=True)
     table: RewardTable = PUSH
 
     @classmethod
     def on(cls, config: PushConfig, hand: HandFile, stance: Stance) -> "Push":
         """The task for a hand that stands in its settled stance."""
         del hand
-        return cls(config, stance)
+        return cls(config, stance, tips=len(stance.footprint_v))
 
     @property
     def input_terms(self) -> tuple[InputTerm, ...]:
@@ -108,7 +110,7 @@ class Push(Walking):
 
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+    ) -> tuple[PhysicsState, Float[Array, " joints"]]:
         """The stance with noise at a random heading ψ, the cube before it.
 
         The cube is at p_o = p + d (cos(ψ + β), sin(ψ + β)), with d and β drawn.
@@ -223,7 +225,8 @@ class Push(Walking):
         qpos = jnp.concatenate(
             [signals.palm_pos_w, signals.palm_quat_w, signals.joint_pos]
         )
-        qpos = jnp.append(qpos, extra["object_pos_w"])
+        # As in the scene, where the cube's orientation follows; it is not used.
+        qpos = jnp.concatenate([qpos, extra["object_pos_w"], jnp.zeros(4)])
         camera = step_camera(
             key, self.config.camera, task.camera, self._truth(now_s, qpos)
         )

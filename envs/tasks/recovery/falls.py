@@ -91,6 +91,10 @@ def falls_of(hand: HandFile, stance: Stance, held_out: bool = False) -> Falls:
     stored, hand = load_falls(held_out), hand.without_effects
     if hand.sha256 == stored.hand_sha256:
         return stored
+    found, wanted = len(stance.target_rad), len(stored.target_rad[0])
+    if found != wanted:
+        valid = f"a hand of {wanted} joints: the fallen poses are of such a one"
+        raise InputError("hand file", "description", f"{found} joints", valid)
     return settle_falls(hand, stance, OTHER_PER_SIDE, held_out)
 
 
@@ -157,7 +161,7 @@ def _poses(
 
 def _draw_curl(
     rng: np.random.Generator, model: mujoco.MjModel
-) -> Float[np.ndarray, "20"]:
+) -> Float[np.ndarray, " joints"]:
     fingers = [rng.uniform(*_THUMB_CURL), *rng.uniform(*_FINGER_CURL, size=(4, 4))]
     return np.clip(np.concatenate(fingers), *model.jnt_range[1:].T)
 

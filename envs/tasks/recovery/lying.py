@@ -11,7 +11,7 @@ _CURL_S = 1.5
 _GAP_M = 0.002
 
 
-def clearance_m(model: mujoco.MjModel, qpos: Float[np.ndarray, "27"]) -> float:
+def clearance_m(model: mujoco.MjModel, qpos: Float[np.ndarray, " nq"]) -> float:
     """Least distance of the hand to the floor, d = min over geoms.
 
     Args:
@@ -34,7 +34,7 @@ def clearance_m(model: mujoco.MjModel, qpos: Float[np.ndarray, "27"]) -> float:
     )
 
 
-def down_b(qpos: Float[np.ndarray, "27"]) -> Float[np.ndarray, "3"]:
+def down_b(qpos: Float[np.ndarray, " nq"]) -> Float[np.ndarray, "3"]:
     """Direction of gravity in the palm frame, g = q* ⊗ (0, 0, −1) ⊗ q.
 
     Args:
@@ -73,8 +73,8 @@ def turned_down(axis: Float[np.ndarray, "3"]) -> Float[np.ndarray, "4"]:
 
 
 def curl(
-    model: mujoco.MjModel, stance: Stance, target: Float[np.ndarray, "20"]
-) -> Float[np.ndarray, "20"]:
+    model: mujoco.MjModel, stance: Stance, target: Float[np.ndarray, " joints"]
+) -> Float[np.ndarray, " joints"]:
     """Joint angles after the fingers have curled from the stance, without weight.
 
     The servos follow θ(t) = θ* + (θ_1 − θ*) min(1, 1.5 t/T), T = 1.5 s.
@@ -105,8 +105,8 @@ def curl(
 
 def lie_down(
     model: mujoco.MjModel,
-    joints: Float[np.ndarray, "20"],
-    target: Float[np.ndarray, "20"],
+    joints: Float[np.ndarray, " joints"],
+    target: Float[np.ndarray, " joints"],
     quat: Float[np.ndarray, "4"],
     duration_s: float = SETTLE_S,
 ) -> mujoco.MjData:

@@ -104,7 +104,7 @@ def settle_practice(hand: HandFile, stance: Stance) -> Poses:
 def _pose(
     model: mujoco.MjModel,
     level: Float[np.ndarray, "3"],
-    draw: Callable[[], Float[np.ndarray, "27"]],
+    draw: Callable[[], Float[np.ndarray, " nq"]],
     tilt_rad: float,
 ) -> tuple[float, ...]:
     """Draws until the hand has the tilt and does not reach into the floor."""
@@ -119,7 +119,7 @@ def _pose(
 
 def _sink(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance
-) -> Float[np.ndarray, "27"]:
+) -> Float[np.ndarray, " nq"]:
     share, duration_s = rng.uniform(), _draw_duration_s(rng)
     target = _draw_target(rng, model, stance, share)
     joints, quat = curl(model, stance, target), _draw_lean(rng, stance, share)
@@ -128,7 +128,7 @@ def _sink(
 
 def _tip(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance, falls: Falls
-) -> Float[np.ndarray, "27"]:
+) -> Float[np.ndarray, " nq"]:
     k, share = rng.integers(len(falls.side)), rng.uniform()
     over = (1.0 - share) * down_b(np.array(stance.qpos))
     over = over + share * down_b(np.array(falls.qpos[k]))
@@ -149,7 +149,7 @@ def _angle(one: Float[np.ndarray, "3"], other: Float[np.ndarray, "3"]) -> float:
 
 def _draw_target(
     rng: np.random.Generator, model: mujoco.MjModel, stance: Stance, share: float
-) -> Float[np.ndarray, "20"]:
+) -> Float[np.ndarray, " joints"]:
     away = rng.uniform(-_REACH_RAD, _REACH_RAD, 20)
     return np.clip(np.array(stance.target_rad) + share * away, *model.jnt_range[1:].T)
 

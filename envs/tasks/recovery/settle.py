@@ -39,7 +39,7 @@ class Settling:
 
     level_since: Int[Array, "*b"]
     ramp_since: Int[Array, "*b"]
-    start_rad: Float[Array, "*b 20"]
+    start_rad: Float[Array, "*b joints"]
 
     @property
     def begun(self) -> Bool[Array, "*b"]:
@@ -68,9 +68,9 @@ class Settle:
         settling: Settling,
         gravity_b: Float[Array, "3"],
         angvel_b: Float[Array, "3"],
-        proposed_rad: Float[Array, "20"],
+        proposed_rad: Float[Array, " joints"],
         steps: Int[Array, ""],
-    ) -> tuple[Settling, Float[Array, "20"]]:
+    ) -> tuple[Settling, Float[Array, " joints"]]:
         """One control step: θ = policy's target, or θ_0 + (θ* − θ_0)(3s² − 2s³).
 
         Args:
@@ -109,7 +109,9 @@ class Settle:
         """
         return settling.begun & (self._share(settling, steps) >= 1.0)
 
-    def _ramp(self, settling: Settling, steps: Int[Array, ""]) -> Float[Array, "20"]:
+    def _ramp(
+        self, settling: Settling, steps: Int[Array, ""]
+    ) -> Float[Array, " joints"]:
         start, goal = settling.start_rad, jnp.array(self.goal_rad)
         s = self._share(settling, steps)
         return start + (goal - start) * (s * s * (3.0 - 2.0 * s))
@@ -155,11 +157,11 @@ def level_and_calm(
 
 
 def action_toward(
-    target_rad: Float[Array, "20"],
-    goal_rad: Float[Array, "20"],
+    target_rad: Float[Array, " joints"],
+    goal_rad: Float[Array, " joints"],
     action_scale_rad: float,
     action_clip: float,
-) -> Float[Array, "20"]:
+) -> Float[Array, " joints"]:
     """The policy output that would move the targets so, a = clip(atanh(Δ/α), ±c).
 
     Args:

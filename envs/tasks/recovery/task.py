@@ -94,7 +94,7 @@ class Recovery(HandTask):
 
     def start(
         self, key: PRNGKeyArray, plant: Plant, world: PerWorldState
-    ) -> tuple[PhysicsState, Float[Array, "20"]]:
+    ) -> tuple[PhysicsState, Float[Array, " joints"]]:
         """One of the fallen poses at rest, at a random heading, θ = clip(q, limits).
 
         The joint targets θ are the joint angles q: the motors were off and are
@@ -220,8 +220,8 @@ class Recovery(HandTask):
         )
 
     def override(
-        self, plant: Plant, memory: Memory, action: Float[Array, "20"]
-    ) -> tuple[Memory, Float[Array, "20"]]:
+        self, plant: Plant, memory: Memory, action: Float[Array, " joints"]
+    ) -> tuple[Memory, Float[Array, " joints"]]:
         """With `settle`, the ramp's motion once the hand is upright, a ← atanh(Δ/α).
 
         Returns:
@@ -246,7 +246,7 @@ class Recovery(HandTask):
         task = memory.task.replace(settling=settling)
         return memory.replace(task=task), action
 
-    def _pose(self, key: PRNGKeyArray) -> Float[Array, "27"]:
+    def _pose(self, key: PRNGKeyArray) -> Float[Array, " nq"]:
         """Generalized position of the fall or practice pose of an episode."""
         fall = jnp.array(self.falls.qpos)[self._drawn(key)]
         if not self.practice:

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from envs.hand.spec import TIP_SPHERES
+from envs.hand.spec import hand_spec
 from fingers_mjx.pictures.raycast import geom_colours
 
 Rgb = tuple[int, int, int]
@@ -27,10 +27,10 @@ ACHIEVED: Rgb = (70, 150, 220)
 
 def finger_colours(model: mujoco.MjModel) -> tuple[Rgb, ...]:
     """Returns a colour for each finger: its own, unless two fingers share one."""
-    tips = [model.geom(name).id for name in TIP_SPHERES]
+    tips = [model.geom(name).id for name in hand_spec(model).tip_spheres]
     own = np.rint(255 * geom_colours(model)[tips]).astype(int)
     if len(np.unique(own, axis=0)) < len(own):
-        return OKABE_ITO
+        return OKABE_ITO[: len(own)]
     return tuple((red, green, blue) for red, green, blue in own.tolist())
 
 

@@ -1,4 +1,4 @@
-"""The lift objective as five dials, in SVG: what each finger's average is, and when."""
+"""The lift objective as dials, in SVG: what each finger's average is, and when."""
 
 import math
 from collections.abc import Sequence
@@ -26,7 +26,7 @@ def dials(lifts: Lifts | None, colours: Sequence[Rgb]) -> str:
         colours: of the fingers.
     """
     body = "".join(_dial(i, lifts, hex_of(c)) for i, c in enumerate(colours))
-    size = f'viewBox="0 0 {BESIDE * len(FINGERS)} {HEIGHT}" width="100%"'
+    size = f'viewBox="0 0 {BESIDE * len(colours)} {HEIGHT}" width="100%"'
     return f'<svg xmlns="http://www.w3.org/2000/svg" {size}>{body}</svg>'
 
 

@@ -7,8 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.errors import InputError
-from envs.hand.nominal import vendor_hand
-from envs.hand.spec import HAND_NQ, JOINT_QPOS
+from envs.hand.spec import hand_spec
 from fingers_deploy.rotations import multiply
 from fingers_mjx.play.viewer.view import Poses, body_poses
 from sysid.logs.log import MeasuredLog
@@ -28,7 +27,7 @@ class Motion:
     """
 
     t_s: Float[np.ndarray, " n"]
-    joint_pos: Float[np.ndarray, "n 20"]
+    joint_pos: Float[np.ndarray, "n joints"]
     base: Float[np.ndarray, "n 7"] | None
 
     @property
@@ -37,13 +36,16 @@ class Motion:
         return float(self.t_s[-1])
 
 
-def motion_of(log: MeasuredLog) -> Motion:
+def motion_of(log: MeasuredLog, names: tuple[str, ...]) -> Motion:
     """Returns the motion of a whole hand.
+
+    Args:
+        log: of the hand.
+        names: of its joints, in order.
 
     Raises:
         InputError: a joint of the hand is missing, or time runs backward.
     """
-    names = vendor_hand().joint_names
     joint_pos = np.stack([log.column(f"pos.{name}") for name in names], axis=1)
     if np.any(np.diff(log.t_s) <= 0.0):
         valid = "times that rise from row to row"
@@ -63,6 +65,7 @@ class Ghost:
 
     def __init__(self, model: mujoco.MjModel, motion: Motion):
         self._model, self._data = model, mujoco.MjData(model)
+        self._hand = hand_spec(model)
         self.motion = motion
 
     def at(
@@ -84,8 +87,8 @@ class Ghost:
         base = now if self.motion.base is None else self._base(row, start)
         if not (np.isfinite(joint_pos).all() and np.isfinite(base).all()):
             return None
-        self._data.qpos[:7], self._data.qpos[JOINT_QPOS] = base, joint_pos
-        self._data.qpos[HAND_NQ:] = self._model.qpos0[HAND_NQ:]
+        self._data.qpos[:7], self._data.qpos[self._hand.joint_qpos] = base, joint_pos
+        self._data.qpos[self._hand.nq :] = self._model.qpos0[self._hand.nq :]
         mujoco.mj_kinematics(self._model, self._data)
         return body_poses(self._data)
 

@@ -12,7 +12,6 @@ from jaxtyping import Float
 from envs.hand.drive.chain import chain_drive
 from envs.hand.hand_file import HandFile
 from envs.hand.model import PHYSICS_DT_S, V_SITE
-from envs.hand.spec import JOINT_QPOS
 from envs.tasks.gait import Walking
 from fingers_mjx.play.player import Episode, Player, varied_model
 from fingers_mjx.play.viewer.switches import own_effects, switched
@@ -181,7 +180,7 @@ def carried_over(episode: Episode, old: Player, new: Player) -> Episode:
     data.qpos[:], data.qvel[:] = episode.data.qpos, episode.data.qvel
     mujoco.mj_forward(model, data)
     new.take_over(old)
-    q = jnp.asarray(data.qpos[JOINT_QPOS], jnp.float32)
+    q = jnp.asarray(data.qpos[new.env.spec.joint_qpos], jnp.float32)
     target = jnp.asarray(new.controller.target_rad, jnp.float32)
     drive = new.env.plant.drive.begin(target, q)
     return Episode(model, data, dataclasses.replace(episode.memory, drive=drive))

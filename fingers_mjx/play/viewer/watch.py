@@ -13,7 +13,6 @@ import mujoco
 import numpy as np
 
 from envs.errors import InputError
-from envs.hand.spec import HAND_NQ
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.viewer.ghost import Ghost, heading, motion_of
 from fingers_mjx.play.viewer.live import Live
@@ -67,7 +66,11 @@ def watch(watched: Watched, port: int, goes_on: Callable[[], bool] = lambda: Tru
             with which there is no environment.
     """
     setup = _without_own_commands(watched.setup)
-    motion = None if watched.log is None else motion_of(watched.log)
+    motion = (
+        None
+        if watched.log is None
+        else motion_of(watched.log, setup.hand.nominal.joint_names)
+    )
     knobs = knobs_for(watched)
     env = make_env(setup, 1, "cpu")
     model = env.mj_model
@@ -203,7 +206,7 @@ def _without_own_commands(setup: Setup) -> Setup:
 
 def _at_rest(model: mujoco.MjModel, qpos) -> mujoco.MjData:
     data = mujoco.MjData(model)
-    data.qpos[:HAND_NQ] = qpos
+    data.qpos[: len(qpos)] = qpos
     mujoco.mj_kinematics(model, data)
     return data
 

@@ -104,7 +104,7 @@ def _scaled(
     name, parameter = _PER_JOINT[cause.effect]
     old: JointQuantity = getattr(hand, name)
     estimate = cause.parameters[parameter]
-    values = old.per_joint()
+    values = hand.per_joint(name)
     joints = list(mechanism.joints)
     named = mechanism.classes.get(cause.where, (cause.where,))
     at = joints if cause.where == "all" else [j for j in joints if j in named]

@@ -39,12 +39,12 @@ def test_payload_lies_on_the_back():
 
 def test_damping_keeps_the_nominal_damping_ratio():
     """kd / (2 sqrt(kp I)) does not change when kp is scaled by s and kd by sqrt(s)."""
-    expected = math.sqrt(HAND.stiffness_scale.per_joint()[0])
-    np.testing.assert_allclose(HAND.damping_scale.per_joint(), expected, rtol=1e-6)
+    expected = math.sqrt(HAND.per_joint("stiffness_scale")[0])
+    np.testing.assert_allclose(HAND.per_joint("damping_scale"), expected, rtol=1e-6)
 
 
 def test_abduction_is_slower():
-    speeds = HAND.speed_limit.per_joint().reshape(5, 4)
+    speeds = HAND.per_joint("speed_limit").reshape(5, 4)
     np.testing.assert_array_equal(speeds, np.tile([2.8, 2.5, 2.8, 2.8], (5, 1)))
 
 
@@ -80,9 +80,9 @@ def test_forms_of_a_per_joint_quantity_agree():
         scale = dataclasses.replace(
             HAND.stiffness_scale, value=form, low=None, high=None
         )
-        np.testing.assert_array_equal(scale.per_joint(), values)
+        np.testing.assert_array_equal(scale.per_joint(JOINTS), values)
     scalar = dataclasses.replace(HAND.torque_scale, value=0.5)
-    np.testing.assert_array_equal(scalar.per_joint(), np.full(20, 0.5))
+    np.testing.assert_array_equal(scalar.per_joint(JOINTS), np.full(20, 0.5))
 
 
 def test_digest_is_of_the_contents(tmp_path):

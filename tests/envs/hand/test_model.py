@@ -11,17 +11,12 @@ from envs.hand import nominal
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, PAYLOAD, build_model, build_spec
 from envs.hand.nominal import FINGERS, vendor_hand
-from envs.hand.spec import (
-    OTHER_LINKS,
-    TIP_LINKS,
-    TIP_SITES,
-    TIP_SPHERES,
-    hand_spec,
-)
+from envs.hand.spec import hand_spec
 from envs.hand.stance import load_stance
 
 HAND = load_hand_file()
 MODEL = build_model(HAND)
+SPEC = hand_spec(MODEL)
 VENDOR = json.loads(Path(nominal.__file__).with_name("vendor_hand.json").read_text())
 CHECKS = tuple(
     (np.array(check["qpos"]), np.array(check["fingertip_in_palm"]))
@@ -36,7 +31,7 @@ def tips_in_palm(qpos):
     data.qpos[3:7] /= np.linalg.norm(data.qpos[3:7])
     mujoco.mj_kinematics(MODEL, data)
     palm = data.body(PALM)
-    tips = np.array([data.site(name).xpos for name in TIP_SITES])
+    tips = np.array([data.site(name).xpos for name in SPEC.tip_sites])
     return (tips - palm.xpos) @ palm.xmat.reshape(3, 3)
 
 
@@ -95,14 +90,14 @@ def test_the_hand_file_reaches_the_model():
     friction = {
         MODEL.geom(g).name: other.geom_friction[g, 0] for g in range(other.ngeom)
     }
-    assert {friction[name] for name in TIP_LINKS + TIP_SPHERES} == {0.9}
-    assert {friction[name] for name in (*OTHER_LINKS, PALM, PAYLOAD)} == {0.4}
+    assert {friction[name] for name in SPEC.tip_links + SPEC.tip_spheres} == {0.9}
+    assert {friction[name] for name in (*SPEC.other_links, PALM, PAYLOAD)} == {0.4}
 
 
 def test_geometry_is_primitive_and_a_tip_is_the_end_of_its_capsule():
     kinds = mujoco.mjtGeom
     assert MODEL.nmesh == 0
-    for link, sphere in zip(TIP_LINKS, TIP_SPHERES, strict=True):
+    for link, sphere in zip(SPEC.tip_links, SPEC.tip_spheres, strict=True):
         capsule, tip = MODEL.geom(link), MODEL.geom(sphere)
         assert capsule.type[0] == kinds.mjGEOM_CAPSULE
         assert tip.type[0] == kinds.mjGEOM_SPHERE
@@ -112,8 +107,8 @@ def test_geometry_is_primitive_and_a_tip_is_the_end_of_its_capsule():
         ends = capsule.pos + np.array([half, -half])
         assert np.linalg.norm(ends - tip.pos, axis=1).min() < 1e-9
         assert tip.size[0] == capsule.size[0]
-    sites = [MODEL.site(name).pos for name in TIP_SITES]
-    np.testing.assert_allclose(sites, [MODEL.geom(s).pos for s in TIP_SPHERES])
+    sites = [MODEL.site(name).pos for name in SPEC.tip_sites]
+    np.testing.assert_allclose(sites, [MODEL.geom(s).pos for s in SPEC.tip_spheres])
 
 
 def collide(one, other):
@@ -124,13 +119,13 @@ def collide(one, other):
 
 def test_what_may_touch_what():
     """A tip meets the floor with its sphere and the rest of the hand as a capsule."""
-    links = (*OTHER_LINKS, PALM, PAYLOAD)
-    assert all(collide(name, FLOOR) for name in (*links, *TIP_SPHERES))
-    assert not any(collide(name, FLOOR) for name in TIP_LINKS)
-    capsules = (*TIP_LINKS, *links)
+    links = (*SPEC.other_links, PALM, PAYLOAD)
+    assert all(collide(name, FLOOR) for name in (*links, *SPEC.tip_spheres))
+    assert not any(collide(name, FLOOR) for name in SPEC.tip_links)
+    capsules = (*SPEC.tip_links, *links)
     assert all(collide(a, b) for a in capsules for b in capsules)
     assert not any(
-        collide(a, b) for a in TIP_SPHERES for b in (*capsules, *TIP_SPHERES)
+        collide(a, b) for a in SPEC.tip_spheres for b in (*capsules, *SPEC.tip_spheres)
     )
 
 

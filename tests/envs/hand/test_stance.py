@@ -10,7 +10,7 @@ from envs.hand import stance as stance_module
 from envs.hand.hand_file import load_hand_file
 from envs.hand.model import FLOOR, PALM, build_model
 from envs.hand.nominal import FINGERS
-from envs.hand.spec import TIP_SITES, TIP_SPHERES
+from envs.hand.spec import hand_spec
 from envs.hand.stance import load_stance, settle, stance_json, stance_of
 from envs.hand.support import support_margins
 
@@ -18,6 +18,7 @@ HAND = load_hand_file()
 STANCE = load_stance()
 TARGET = np.array(STANCE.target_rad)
 MODEL = build_model(HAND, np.array(STANCE.q_off))
+SPEC = hand_spec(MODEL)
 
 
 @pytest.fixture(scope="module")
@@ -46,8 +47,8 @@ def test_five_tips_and_nothing_else_are_down(standing):
         pair = set(standing.contact[index].geom.tolist())
         assert floor in pair
         touching |= pair - {floor}
-    assert {MODEL.geom(g).name for g in touching} == set(TIP_SPHERES)
-    for link in TIP_SPHERES:
+    assert {MODEL.geom(g).name for g in touching} == set(SPEC.tip_spheres)
+    for link in SPEC.tip_spheres:
         slot = MODEL.sensor(f"force_{link}")
         force = standing.sensordata[slot.adr[0] :][: slot.dim[0]]
         assert np.linalg.norm(force) > 0.15, link
@@ -65,7 +66,7 @@ def test_v_is_level_and_points_from_the_palm_to_the_distal_links(standing):
 
 def test_nominal_footprint_is_where_the_tips_are(standing):
     axes = standing.site("control_frame").xmat.reshape(3, 3)
-    tips = np.array([standing.site(name).xpos for name in TIP_SITES])
+    tips = np.array([standing.site(name).xpos for name in SPEC.tip_sites])
     in_v = (tips - standing.body(PALM).xpos) @ axes
     np.testing.assert_allclose(STANCE.footprint_v, in_v, atol=5e-5)
     # The four fingers stand side by side, from the index to the little finger.
@@ -74,7 +75,7 @@ def test_nominal_footprint_is_where_the_tips_are(standing):
 
 
 def test_the_centre_of_mass_is_well_inside_the_footprint(standing):
-    tips = np.array([standing.site(name).xpos[:2] for name in TIP_SITES])
+    tips = np.array([standing.site(name).xpos[:2] for name in SPEC.tip_sites])
     margin = support_margins(standing.subtree_com[1][:2], tips).min()
     assert margin > 0.025
     outside = support_margins(tips.mean(axis=0) + np.array([0.2, 0]), tips).min()

@@ -3,18 +3,15 @@
 Both see the same states; the shim only through what a robot would measure.
 """
 
-from functools import partial
-from itertools import pairwise
-
 import jax
 import numpy as np
 import pytest
 from support.cli_setup import make_bundle, make_setup, random_weights
+from support.shim import differences, driven, measured
 
 from envs.commands import CommandConfig
 from envs.randomize import no_randomization
 from fingers_deploy import ActionTransform, PolicyController, load_bundle
-from fingers_mjx.policy.actor import act
 from fingers_mjx.runs.setup import make_env
 
 STEPS = 40
@@ -48,49 +45,12 @@ def world(setup):
 @pytest.fixture(scope="module", params=["onnxruntime", "numpy"])
 def rollout(request, world, bundle):
     """States of one world that the shim drives, one more than actions."""
-    reset, step = world
-    controller = PolicyController(bundle, request.param)
-    states = [jax.device_get(reset(jax.random.key(4)))]
-    while len(states) <= STEPS:
-        controller.step(**measured(states[-1]))
-        states.append(jax.device_get(step(states[-1], controller.action)))
+    states = driven(world, bundle, request.param, STEPS)
     return request.param, states
 
 
-def measured(state):
-    """What encoders, IMU and operator report, in the shim's terms."""
-    w, x, y, z = state.data.qpos[3:7]
-    down_b = -np.array(
-        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]
-    )
-    return {
-        "joint_pos": state.data.qpos[7:],
-        "gravity_b": down_b,
-        "angvel_b": state.data.qvel[3:6],
-        "command": state.memory.command,
-    }
-
-
-def differences(bundle, rollout, change=lambda measured: measured):
-    """Largest difference of observation, action and target over the rollout."""
-    runtime, states = rollout
-    controller = PolicyController(bundle, runtime)
-    decide = partial(act, bundle.network)
-    worst = np.zeros(3)
-    for state, after in pairwise(states):
-        target = controller.step(**change(measured(state)))
-        action = np.clip(decide(state.obs["state"]), -CLIP, CLIP)
-        pairs = (
-            (controller.observation, state.obs["state"]),
-            (controller.action, action),
-            (target, after.memory.target),
-        )
-        worst = np.maximum(worst, [np.abs(a - b).max() for a, b in pairs])
-    return dict(zip(("observation", "action", "target"), worst, strict=True))
-
-
 def test_shim_equals_environment(bundle, rollout):
-    found = differences(bundle, rollout)
+    found = differences(bundle, *rollout)
     assert found["observation"] <= TOLERANCE
     assert found["action"] <= 1e-5
     assert found["target"] <= TOLERANCE
@@ -146,7 +106,7 @@ WRONG = [swap_joints, flip_gravity, world_angvel, degrees]
 
 @pytest.mark.parametrize("wrong", WRONG, ids=lambda f: f.__name__)
 def test_wrong_measurement_is_found(bundle, rollout, wrong):
-    found = differences(bundle, rollout, wrong)
+    found = differences(bundle, *rollout, wrong)
     assert found["observation"] > 1e-2
     assert found["target"] > 1e-3
 

@@ -8,6 +8,7 @@ import pytest
 from PIL import Image
 
 from envs.hand.hand_file import load_hand_file
+from envs.hand.nominal import FINGERS
 from envs.hand.stance import load_stance
 from fingers_mjx.cli.main import main
 from fingers_mjx.pictures import hand as hand_show
@@ -23,7 +24,7 @@ def test_facts_of_the_stance(standing):
     assert facts["palm_height_mm"] == pytest.approx(1000 * load_stance().root_pos_w[2])
     assert 15 < facts["static_margin_mm"] < 50
     assert 0 < facts["palm_pitch_deg"] < 70
-    assert all(abs(facts[f"pad_tilt_deg_{f}"]) < 64 for f in hand_show.FINGERS)
+    assert all(abs(facts[f"pad_tilt_deg_{f}"]) < 64 for f in FINGERS)
 
 
 def test_tips_stand_where_the_footprint_says(standing):

@@ -7,7 +7,6 @@ from support.cli_setup import default_hand
 
 from envs.errors import InputError
 from envs.hand.model import build_model
-from envs.hand.spec import HAND_NQ
 from envs.hand.stance import stance_of
 from fingers_mjx.pictures import renderer as module
 from fingers_mjx.pictures.camera import Camera
@@ -24,7 +23,7 @@ def scene():
     stance = stance_of(default_hand())
     model = build_model(default_hand(), np.array(stance.q_off))
     data = mujoco.MjData(model)
-    data.qpos[:HAND_NQ] = stance.qpos
+    data.qpos[: len(stance.qpos)] = stance.qpos
     mujoco.mj_forward(model, data)
     return model, data
 

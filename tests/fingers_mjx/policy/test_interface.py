@@ -12,7 +12,7 @@ from fingers_deploy import load_bundle
 from fingers_mjx.policy.interface import check_interface
 
 COMMITTED = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
-SPEEDS = tuple(load_hand_file().speed_limit.per_joint().tolist())
+SPEEDS = tuple(load_hand_file().per_joint("speed_limit").tolist())
 
 
 def with_speeds(value):

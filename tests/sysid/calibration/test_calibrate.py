@@ -82,7 +82,7 @@ def test_the_hand_file_has_it_with_its_provenance(found, hidden, tmp_path):
     assert hand.tip_friction.source == source
     names = list(hand_mechanism().joints)
     moved = [names.index(hidden[1][i]) for i in (1, 2)]
-    new, was = (h.stiffness_scale.per_joint() for h in (hand, old))
+    new, was = (h.per_joint("stiffness_scale") for h in (hand, old))
     assert np.flatnonzero(new != was).tolist() == moved
     assert new[moved[1]] / was[moved[1]] == pytest.approx(1.3, rel=0.1)
     assert hand.palm_mass == old.palm_mass

@@ -5,8 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from fingers_deploy.manifest import JOINT_COUNT
-from fingers_robot.reading import Array
+from fingers_robot.reading import JOINT_COUNT, Array
 from fingers_robot.safety.limits import Limits, outside
 from fingers_robot.safety.types import Found, Inputs
 

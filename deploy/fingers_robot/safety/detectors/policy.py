@@ -12,8 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingers_deploy.manifest import JOINT_COUNT
-from fingers_robot.reading import Array
+from fingers_robot.reading import JOINT_COUNT, Array
 from fingers_robot.safety.limits import Limits, outside
 from fingers_robot.safety.types import Found, Inputs, PolicyFault, Proposal
 

@@ -11,11 +11,12 @@ from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml, load_hand_file
 from envs.hand.importing.check import TIP_ERROR_M, check_same, tip_error_m
 from envs.hand.importing.convert import import_hand
+from envs.hand.importing.joint_map import JointMap
 from envs.hand.importing.load import load_custom_hand
 from envs.hand.importing.palm import Frame, rotation
 from envs.hand.importing.place import place
 from envs.hand.model import PALM, PAYLOAD, build_model, build_spec
-from envs.hand.nominal import NAMES, vendor_hand
+from envs.hand.nominal import vendor_hand
 from envs.hand.quantity import JointQuantity
 from envs.hand.stance import load_stance, stance_of
 from envs.registry import make_env
@@ -165,7 +166,7 @@ def test_our_own_hand_comes_back(ours):
 
 
 def test_other_names_frames_and_meshes_are_the_same_hand(vendor):
-    found = import_hand(vendor, THEIRS)
+    found = import_hand(vendor, JointMap(THEIRS))
     assert_same(build_model(found.hand), MODEL)
     np.testing.assert_allclose(
         stance_of(found.hand).qpos, load_stance().qpos, atol=1e-4
@@ -183,8 +184,8 @@ def test_the_vendors_nominal_gains_are_scaled_as_ours_are(tmp_path):
 
 def test_a_shifted_link_and_a_lost_gram_are_seen(vendor):
     """Negative control of the comparison at the end of every import."""
-    hand = import_hand(vendor, THEIRS).hand
-    placed = place(load_custom_hand(vendor, THEIRS))
+    hand = import_hand(vendor, JointMap(THEIRS)).hand
+    placed = place(load_custom_hand(vendor, JointMap(THEIRS)))
     assert tip_error_m(placed, hand) < TIP_ERROR_M
     check_same(placed, hand)
     for index in range(20):
@@ -219,7 +220,7 @@ def test_the_frame_of_the_palm_may_be_given(tmp_path):
     with pytest.raises(InputError, match=r"palm_quat: found finger bases .* mm from"):
         import_hand(path)
     quat = tuple(np.array(TURNED) * [1, -1, -1, -1])
-    links = import_hand(path, palm_quat=quat).hand.nominal.links
+    links = import_hand(path, JointMap(palm_quat=quat)).hand.nominal.links
     wanted = np.array([link.pos for link in vendor_hand().links[::4]])
     wanted[0, 1] += 0.08
     np.testing.assert_allclose([k.pos for k in links[::4]], wanted, atol=1e-6)
@@ -272,7 +273,7 @@ def test_the_environment_runs_the_imported_hand(ours):
 
 def test_a_flat_link_keeps_moments_that_a_body_can_have(tmp_path):
     spec = build_spec(HAND)
-    for body, _ in NAMES:
+    for body in (link.body for link in vendor_hand().links):
         spec.body(body).inertia = [1e-6, 1e-6, 2e-6]
     hand = import_hand(written(tmp_path / "hand.xml", spec)).hand
     found = np.sort(build_model(hand).body_inertia[3:], axis=1)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
+from envs.hand.importing.joint_map import JointMap
 from envs.hand.importing.load import load_custom_hand
 from envs.hand.nominal import vendor_hand
 
@@ -80,7 +81,7 @@ def test_joint_map(tmp_path):
     path = write(tmp_path, hand_xml(prefix="right_"))
     with pytest.raises(InputError, match=r"finger1_joint1 \(near: right_finger1_joint"):
         load_custom_hand(path)
-    hand = load_custom_hand(path, {name: f"right_{name}" for name in JOINTS})
+    hand = load_custom_hand(path, JointMap({name: f"right_{name}" for name in JOINTS}))
     assert hand.joints == tuple(f"right_{name}" for name in JOINTS)
 
 
@@ -94,7 +95,7 @@ def test_joint_map(tmp_path):
 )
 def test_wrong_joint_map(tmp_path, joint_map, message):
     with pytest.raises(InputError, match=message):
-        load_custom_hand(write(tmp_path, GOOD), joint_map)
+        load_custom_hand(write(tmp_path, GOOD), JointMap(joint_map))
 
 
 def test_what_is_filled_in_is_said(tmp_path):

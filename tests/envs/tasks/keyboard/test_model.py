@@ -7,7 +7,6 @@ import pytest
 from support.keyboard_rig import Rig
 
 from envs.hand.nominal import vendor_hand
-from envs.hand.spec import HAND_NQ
 from envs.tasks.keyboard.model import (
     ACTUATION_M,
     ARROWS,
@@ -74,12 +73,12 @@ def test_a_force_on_a_key_moves_it_as_the_data_sheet_says(rig):
             data.qpos[2], data.qvel[:6] = 1.0, 0.0
             data.xfrc_applied[body, 2] = -force_n
             mujoco.mj_step(model, data)
-        return data.qpos[HAND_NQ + KEY_NAMES.index("up")]
+        return data.qpos[27 + KEY_NAMES.index("up")]
 
     assert abs(depth_m(0.0)) < 1e-4
     assert depth_m(0.9 * FORCE_N) < ACTUATION_M < depth_m(1.1 * FORCE_N)
     assert depth_m(5.0) == pytest.approx(TRAVEL_M, abs=5e-4)
-    others = np.delete(data.qpos[HAND_NQ:], KEY_NAMES.index("up"))
+    others = np.delete(data.qpos[27:], KEY_NAMES.index("up"))
     assert np.abs(others).max() < 1e-4
 
 
@@ -89,7 +88,7 @@ def test_forward_kinematics_are_those_of_the_model(rig):
     low, high = vendor_hand().per_joint("range_rad").T
     for _ in range(10):
         joints = rng.uniform(low, high)
-        data.qpos[:7], data.qpos[7:HAND_NQ] = rng.normal(size=7), joints
+        data.qpos[:7], data.qpos[7:27] = rng.normal(size=7), joints
         mujoco.mj_kinematics(rig.model, data)
         frame, tip = data.site("control_frame"), data.site("middle_tip")
         expected = frame.xmat.reshape(3, 3).T @ (tip.xpos - frame.xpos)

@@ -7,7 +7,6 @@ from support.cli_setup import default_hand
 
 from envs.errors import InputError
 from envs.hand.model import build_model
-from envs.hand.spec import HAND_NQ
 from envs.hand.stance import stance_of
 from fingers_mjx.play.viewer.ghost import BASE, Ghost, heading, motion_of
 from fingers_mjx.play.viewer.view import body_poses
@@ -56,11 +55,11 @@ def turned(qpos, angle):
 
 
 def test_the_ghost_stands_as_the_log_says(model, stance):
-    ghost = Ghost(model, motion_of(a_log(stance)))
+    ghost = Ghost(model, motion_of(a_log(stance), NAMES))
     now = np.array(stance.qpos[:7])
     poses = ghost.at(0.41, now, now)
     data = mujoco.MjData(model)
-    data.qpos[:HAND_NQ] = stance.qpos
+    data.qpos[: len(stance.qpos)] = stance.qpos
     data.qpos[7] += 0.1 * np.sin(0.40)
     mujoco.mj_kinematics(model, data)
     np.testing.assert_allclose(poses.pos_w, body_poses(data).pos_w, atol=1e-9)
@@ -70,7 +69,7 @@ def test_the_ghost_stands_as_the_log_says(model, stance):
 
 def test_a_path_goes_where_the_simulated_hand_heads(model, stance):
     """A log that goes 0.3 m along its own x goes along y for a hand turned by 90°."""
-    ghost = Ghost(model, motion_of(a_log(stance, path(stance, 0.3))))
+    ghost = Ghost(model, motion_of(a_log(stance, path(stance, 0.3)), NAMES))
     start = turned(stance.qpos, np.pi / 2)
     end = ghost.at(ghost.motion.length_s - 1e-9, start, start)
     begin = ghost.at(0.0, start, start)
@@ -80,7 +79,7 @@ def test_a_path_goes_where_the_simulated_hand_heads(model, stance):
 
 
 def test_at_its_end_the_log_begins_anew(model, stance):
-    ghost = Ghost(model, motion_of(a_log(stance)))
+    ghost = Ghost(model, motion_of(a_log(stance), NAMES))
     assert ghost.row(0.0) == ghost.row(ghost.motion.length_s) == 0
     assert ghost.row(0.031) == 1
 
@@ -89,7 +88,7 @@ def test_where_a_reading_is_missing_there_is_no_ghost(model, stance):
     column = f"pos.{NAMES[4]}"
     gap = np.full(ROWS, stance.joint_pos_rad[4])
     gap[10] = np.nan
-    ghost = Ghost(model, motion_of(a_log(stance, **{column: gap})))
+    ghost = Ghost(model, motion_of(a_log(stance, **{column: gap}), NAMES))
     now = np.array(stance.qpos[:7])
     assert ghost.at(0.201, now, now) is None
     assert ghost.at(0.221, now, now) is not None
@@ -104,4 +103,4 @@ def test_a_log_of_one_joint_is_refused():
         mounting="palm_fixed",
     )
     with pytest.raises(InputError, match="pos"):
-        motion_of(log)
+        motion_of(log, NAMES)
