@@ -65,7 +65,7 @@ def goal_offsets(
 def support_signals(
     signals: Signals,
     tips_w: Float[Array, "tips 3"],
-    start_w: Float[Array, "tips 2"],
+    start_w: Float[Array, "feet 2"],
     stance: Stance,
     limits: KeyboardConfig,
 ) -> dict[str, Float[Array, "..."]]:
