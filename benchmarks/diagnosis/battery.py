@@ -77,11 +77,12 @@ def _row(task: Task, case: Case) -> Row:
 def _verdict_on(task: Task, case: Case) -> dict:
     """Fields of a row that the diagnosis gives."""
     from benchmarks.diagnosis.hidden.believed import believed, true_parameters
-    from sysid.diagnosis.diagnose import diagnose
+    from sysid.diagnosis.diagnose import examine
+    from sysid.diagnosis.verdict.evidence import evidence
 
     mechanism = believed(case.stand, task.conditions.effort)
     start = time.perf_counter()
-    said = diagnose(list(case.logs), mechanism, seed=task.seed)
+    said, joints = examine(list(case.logs), mechanism, seed=task.seed)
     runtime_s = time.perf_counter() - start
     errors, covered = {}, {}
     for cause in said.causes:
@@ -113,6 +114,11 @@ def _verdict_on(task: Task, case: Case) -> dict:
         if closed
         else (),
         "signs": said.unexplained,
+        "evidence": {
+            j.track.joint: {"+".join(k): v for k, v in evidence(j.search).items()}
+            for j in joints
+            if j.search is not None
+        },
         "runtime_s": runtime_s,
     }
 

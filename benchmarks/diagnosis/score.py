@@ -51,6 +51,8 @@ class Row:
         closed_loop: held-out error of the simulated angle before and after, if there
             is one.
         signs: what the diagnosis says remains unexplained.
+        evidence: by joint and effects ("a+b", "" for none), log predictive likelihood
+            less that of the chosen set.
     """
 
     group: str
@@ -74,6 +76,7 @@ class Row:
     conditions: dict[str, str] = field(default_factory=dict)
     closed_loop: tuple[float, ...] = ()
     signs: tuple[str, ...] = ()
+    evidence: dict[str, dict[str, float]] = field(default_factory=dict)
 
     @property
     def named(self) -> set[str]:

@@ -31,6 +31,10 @@ from sysid.diagnosis.search.problem import Problem, in_lanes
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
 
+TARGET_S = 0.001
+"""Longest time for which substeps have one target, its mean [s]: the exact path costs
+more than all else, and a servo that follows means of a millisecond moves alike."""
+
 WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
 
@@ -56,17 +60,24 @@ def simulated(
         `envs.actuator.joint`.
     """
     dt = problem.data.dt
-    substeps = max(1, int(np.ceil(dt / SUBSTEP_S)))
+    means = _parts(dt, TARGET_S)
+    substeps = means * _parts(dt / means, SUBSTEP_S)
     driven = problem.known == "mechanics"
     steps = len(problem.data.track.cmd)
     window = max(round(WINDOW_S / dt), 8) if driven else steps
-    fixed = (dt / substeps, substeps, _acting(problem.space, thetas), window, driven)
+    names = _acting(problem.space, thetas)
+    fixed = (dt / substeps, (means, substeps), names, window, driven)
     parts = []
     for lanes, count in in_lanes(thetas):
         params, nuisance = problem.space.values(lanes)
         angles = _simulated(problem.data.track, params, nuisance, *fixed)
         parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[:count])
     return np.concatenate(parts)
+
+
+def _parts(whole_s: float, most_s: float) -> int:
+    """Returns how many equal parts are short enough; one per cent may be too long."""
+    return max(1, int(np.ceil(whole_s / most_s - 0.01)))
 
 
 def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
@@ -102,7 +113,7 @@ def _simulated(
     params: dict[str, dict[str, Float[Array, " c"]]],
     nuisance: Nuisance,
     dt: float,
-    substeps: int,
+    divided: tuple[int, int],
     names: tuple[str, ...],
     window: int,
     driven: bool,
@@ -114,7 +125,9 @@ def _simulated(
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
     steps, pieces = track.pos.shape
-    targets = _targets(track, params, dt, substeps, count)
+    means, substeps = divided
+    each = substeps // means
+    targets = _targets(track, params, dt * each, means, count)
     cut = _cut(track, targets, window, dt * substeps)
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
@@ -138,7 +151,7 @@ def _simulated(
         def within(i, c):
             share = (i + 0.5) / substeps
             now = jax.tree.map(lambda a, b: a + share * (b - a), before, after)
-            return substep(c, now, target[i])
+            return substep(c, now, target[i // each])
 
         carry = jax.lax.fori_loop(0, substeps, within, carry)
         return carry, carry[3]
@@ -152,14 +165,14 @@ def _simulated(
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
 
 
-def _targets(track: Track, params, dt: float, substeps: int, count: int):
-    """Mean command of every substep (t, k, p, c), along the sent targets."""
-    ends = jnp.arange(1, substeps + 1)[None, :, None, None]
-    sent = substeps * (track.sent[:, None] + 1.0) - ends
-    held = jnp.repeat(track.held[:, None], substeps, 1)
+def _targets(track: Track, params, dt: float, means: int, count: int):
+    """Mean commands of a step's equal parts (t, k, p, c), along the sent targets."""
+    ends = jnp.arange(1, means + 1)[None, :, None, None]
+    sent = means * (track.sent[:, None] + 1.0) - ends
+    held = jnp.repeat(track.held[:, None], means, 1)
     held, sent = (x.reshape(-1, *x.shape[2:]) for x in (held, sent))
     mean = command_path(held, sent, params, dt).mean
-    return mean.reshape(-1, substeps, track.pos.shape[1], count)
+    return mean.reshape(-1, means, track.pos.shape[1], count)
 
 
 def _cut(

@@ -43,6 +43,7 @@ class Search:
         alternatives: for each cause, models in which another effect takes its place,
             best first.
         without: for each cause, the model without it.
+        rejected: candidates with one effect more, of the last stage, best first.
         samples: number of residuals that count.
     """
 
@@ -51,6 +52,7 @@ class Search:
     best: Model
     alternatives: dict[str, list[Model]]
     without: dict[str, Model]
+    rejected: list[Model]
     samples: int
 
     def gain(self, cause: str) -> float:
@@ -108,6 +110,7 @@ def search(problem: Problem) -> Search:
 def _searched(problem: Problem, base: Model) -> Search:
     """Searches at a given noise."""
     best, judge = base, Judge(problem)
+    stage: list[Model] = []
     alternatives: dict[str, list[Model]] = {}
     for _ in range(MOST):
         stage = extended(problem, best)
@@ -132,7 +135,9 @@ def _searched(problem: Problem, base: Model) -> Search:
         without = {best.effects[0]: base}
     else:
         best, alternatives, without = exchanged(problem, best, base, judge)
-    return Search(problem, base, best, alternatives, without, problem.samples)
+    rejected = [m for m in stage if set(best.effects) < set(m.effects)]
+    parts = (alternatives, without, rejected, problem.samples)
+    return Search(problem, base, best, *parts)
 
 
 def _fullest(better: list[Model]) -> Model:

@@ -53,7 +53,7 @@ def blind(case, limit_nm=None):
     problem = problem_of(all_tracks(logs, mechanism)[0], logs, mechanism, False)
     problem, base = settled(problem)
     samples = int(problem.counts().sum())
-    return blind_effects(Search(problem, base, base, {}, {}, samples))
+    return blind_effects(Search(problem, base, base, {}, {}, [], samples))
 
 
 def most_nm(case) -> float:

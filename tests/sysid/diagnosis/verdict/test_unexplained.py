@@ -34,7 +34,7 @@ def searched():
     problem = problem_of(all_tracks(logs, mechanism)[0], logs, mechanism, False)
     problem, base = settled(problem)
     samples = int(problem.counts().sum())
-    return Search(problem, base, base, {}, {}, samples)
+    return Search(problem, base, base, {}, {}, [], samples)
 
 
 @pytest.mark.parametrize("other", [0, 2])

@@ -1,0 +1,29 @@
+"""The evidence for every set of effects that a search fitted to one joint."""
+
+from sysid.diagnosis.search.candidate import Model, likelihood_gap
+from sysid.diagnosis.search.search import Search
+
+
+def evidence(found: Search) -> dict[tuple[str, ...], float]:
+    """Log predictive likelihoods of sets of effects, less that of the chosen one.
+
+        ℓ(M) − ℓ(M*) = −Δ log L
+
+    Args:
+        found: the search of one joint.
+
+    Returns:
+        By the sorted names of the effects, () for none of them; natural logarithms,
+        0 for the chosen set [1].
+
+    Source:
+        `likelihood_gap`, on stretches that no fit saw.
+    """
+    models: list[Model] = [found.base, *found.rejected, *found.without.values()]
+    for others in found.alternatives.values():
+        models += others
+    gaps = {
+        tuple(sorted(m.effects)): -likelihood_gap(m, found.best, found.samples)
+        for m in models
+    }
+    return {**gaps, tuple(sorted(found.best.effects)): 0.0}
