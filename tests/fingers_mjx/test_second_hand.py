@@ -9,6 +9,7 @@ import jax
 import mujoco
 import numpy as np
 import pytest
+from support.few import FEW
 from support.shim import differences, driven
 
 from envs.errors import InputError
@@ -26,15 +27,7 @@ from fingers_robot.cli.main import main as robot
 
 EXAMPLE = Path(__file__).parents[2] / "examples/second_hand"
 JOINTS, HISTORY = 12, 8
-FEW = (
-    "num_envs=8",
-    "iterations=2",
-    "log_every=1",
-    "ppo.unroll_length=6",
-    "ppo.minibatches=2",
-    "ppo.actor_layers=[16]",
-    "ppo.critic_layers=[16]",
-)
+SETTINGS = ("num_envs=8", *FEW)
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +49,7 @@ def hand(folder):
 def run(folder):
     path = folder / "run"
     argv = ["train", "crawl", "--preset", "cpu", "--hand", str(folder / "hand.yaml")]
-    assert main([*argv, "--out", str(path), "--set", *FEW]) == 0
+    assert main([*argv, "--out", str(path), "--set", *SETTINGS]) == 0
     return path
 
 
@@ -149,7 +142,7 @@ def test_the_script_does_all_of_it(folder):
     spec.loader.exec_module(walk)
     out = folder / "all"
     argv = [str(folder / "hand.yaml"), "--out", str(out), "--episodes", "2"]
-    assert walk.main([*argv, "--seconds", "0.5", "--set", *FEW]) == 0
+    assert walk.main([*argv, "--seconds", "0.5", "--set", *SETTINGS]) == 0
     made = ("stance/left.png", "curve.png", "bundle/policy.onnx", "eval.json")
     assert [
         name for name in (*made, "walk.webp") if not (out / name).stat().st_size

@@ -22,8 +22,9 @@ def evidence(found: Search) -> dict[tuple[str, ...], float]:
     models: list[Model] = [found.base, *found.rejected, *found.without.values()]
     for others in found.alternatives.values():
         models += others
-    gaps = {
-        tuple(sorted(m.effects)): -likelihood_gap(m, found.best, found.samples)
-        for m in models
-    }
-    return {**gaps, tuple(sorted(found.best.effects)): 0.0}
+    said: dict[tuple[str, ...], float] = {}
+    for m in models:  # a set that was fitted twice counts by its better fit
+        key = tuple(sorted(m.effects))
+        value = -likelihood_gap(m, found.best, found.samples)
+        said[key] = max(said.get(key, value), value)
+    return {**said, tuple(sorted(found.best.effects)): 0.0}
