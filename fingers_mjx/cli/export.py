@@ -35,6 +35,6 @@ def run(args: argparse.Namespace) -> int:
         f"wrote {out}: policy.onnx, manifest.json, config.yaml, hand.yaml\n"
         f"largest difference from JAX over {report.observations:,} observations: "
         f"ONNX Runtime {report.onnxruntime:.2g}, NumPy {report.numpy:.2g} "
-        "(1e-5 is the limit)"
+        "(valid: to 1e-5 times the larger of 1 and the output before the clip)"
     )
     return 0

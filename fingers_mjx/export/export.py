@@ -55,9 +55,9 @@ def export_policy(
 
     JAX (on the CPU, in full float32, row by row), ONNX Runtime and the NumPy policy
     see the same 4,096 random observations around the normalizer's mean and 12 extreme
-    ones. The measure is max |Δa| over all clipped actions, at most 1e-5; on the extreme
-    observations, whose float32 rounding grows with the numbers inside, at most
-    1e-5·max(1, max |a|) with a before the clip.
+    ones. The measure is max |Δa| over the clipped actions of an observation, at most
+    1e-5·max(1, max |a|) with a before the clip: rounding in float32 grows with the
+    numbers inside, which in a long training reach a hundred times the clip.
 
     Args:
         out_dir: directory of the bundle; written only if everything agrees.
@@ -173,10 +173,7 @@ def brax_apply(
 
 def _allowed(mean_action: Float[np.ndarray, "B A"]) -> Float[np.ndarray, " B"]:
     """Returns the largest difference allowed on each observation."""
-    allowed = np.full(len(mean_action), PARITY_TOLERANCE)
-    extreme = slice(OBSERVATIONS, None)
-    allowed[extreme] *= np.maximum(1, np.abs(mean_action[extreme]).max(axis=1))
-    return allowed
+    return PARITY_TOLERANCE * np.maximum(1, np.abs(mean_action).max(axis=1))
 
 
 def _evaluate(apply: Apply, obs: Float[np.ndarray, "B N"]) -> Float[np.ndarray, "B A"]:
