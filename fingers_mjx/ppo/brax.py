@@ -104,6 +104,13 @@ def learning_rate(state: optax.OptState) -> Float[Array, ""]:
     return state[-1].hyperparams["learning_rate"]  # pyright: ignore
 
 
+def with_learning_rate(state: optax.OptState, rate: Float[Array, ""]) -> optax.OptState:
+    """Returns `state` of an optimizer made by `make_optimizer` with the rate η [1]."""
+    own = jax.tree.map(lambda x: x, state)  # the dict of the given state stays
+    own[-1].hyperparams["learning_rate"] = rate  # pyright: ignore
+    return own
+
+
 def brax_loss(ppo_networks: PPONetworks) -> Any:
     """Returns Brax's loss (params, scalars, normalizer, data, key) -> (loss, terms).
 

@@ -56,6 +56,10 @@ class PpoConfig:
             hand over within a second; with small ones it stands, and learns from there.
         noise_std_type: "log" learns log σ, which cannot turn negative; "scalar" σ
             (ours).
+        critic_iterations: iterations at the start in which the critic alone learns; the
+            policy then begins with `learning_rate_min` (ours). A bundle brings no
+            critic, and the advantages of an untrained one unlearn within a few updates
+            what the policy can.
         reward_scale: factor on the reward that the learner sees (ours).
         max_bad_updates: consecutive updates skipped as non-finite that stop the run
             (ours).
@@ -79,6 +83,7 @@ class PpoConfig:
     init_noise_std: float = _number(1.0, POSITIVE)
     init_mean_scale: float = _number(1.0, POSITIVE)
     noise_std_type: Literal["log", "scalar"] = "log"
+    critic_iterations: int = _number(0, 0, MAX_ITERATIONS)
     reward_scale: float = _number(1.0, POSITIVE)
     max_bad_updates: int = _number(4, 1, MAX_ITERATIONS)
 

@@ -26,6 +26,7 @@ class PpoScalars:
     learning_rate_min: Float[Array, ""]
     learning_rate_max: Float[Array, ""]
     desired_kl: Float[Array, ""]
+    critic_iterations: Float[Array, ""]
 
 
 @flax.struct.dataclass

@@ -15,6 +15,7 @@ from fingers_mjx.ppo.brax import (
     adapt_learning_rate,
     learning_rate,
     update_normalizer,
+    with_learning_rate,
 )
 from fingers_mjx.ppo.health import finite_terms, note_faults, record, term_names
 from fingers_mjx.ppo.rollout import Rollout
@@ -42,7 +43,8 @@ def improve(
     """Returns `train` after all updates on `rollout`, and the metrics of the updates.
 
     In each epoch the worlds are shuffled and dealt to the minibatches; a world's
-    whole trajectory stays together.
+    whole trajectory stays together. In the first `critic_iterations` the policy's
+    gradients reach Adam's moments, but not the policy.
     """
     config, worlds = learner.config, rollout.reward.shape[1]
     key_deal, key_loss = jax.random.split(key)
@@ -52,6 +54,7 @@ def improve(
     updates = config.epochs * config.minibatches
     batches = deals.reshape(updates, -1), jax.random.split(key_loss, updates)
     update = functools.partial(_update, learner, scalars, rollout)
+    train = _policy_begins(train, scalars)
     train, totals = jax.lax.scan(update, train, batches)
     train = dataclasses.replace(
         train,
@@ -86,9 +89,13 @@ def _update(
     (_, terms), gradient = loss_and_gradient(
         train.params, scalars, train.normalizer, minibatch(rollout, index), key
     )
-    optimizer = adapt_learning_rate(train.optimizer, terms["kl_mean"], scalars)
+    waits = train.iteration < scalars.critic_iterations
+    adapted = adapt_learning_rate(train.optimizer, terms["kl_mean"], scalars)
+    rate = jnp.where(waits, learning_rate(train.optimizer), learning_rate(adapted))
+    optimizer = with_learning_rate(adapted, rate)
     step, optimizer = learner.optimizer.update(gradient, optimizer)  # pyright: ignore
-    params = optax.apply_updates(train.params, step)  # pyright: ignore
+    still = jax.tree.map(lambda x: jnp.where(waits, 0.0, x), step.policy)  # pyright: ignore
+    params = optax.apply_updates(train.params, step.replace(policy=still))  # pyright: ignore
     finite = finite_terms(watched(train.params, terms, gradient))
     ok = jnp.all(finite)
     kept = jax.tree.map(
@@ -103,6 +110,16 @@ def _update(
         health=record(train.health, finite, train.iteration),
     )
     return train, _update_totals(terms, gradient, ok, learning_rate(kept[1]))
+
+
+def _policy_begins(train: TrainState, scalars: PpoScalars) -> TrainState:
+    """Returns `train` with the lowest rate if the critic has just learned alone."""
+    waited = scalars.critic_iterations > 0
+    begins = waited & (train.iteration == scalars.critic_iterations)
+    now = learning_rate(train.optimizer)
+    rate = jnp.where(begins, scalars.learning_rate_min, now)
+    optimizer = with_learning_rate(train.optimizer, rate)
+    return dataclasses.replace(train, optimizer=optimizer)
 
 
 def minibatch(rollout: Rollout, index: Int[Array, " n"]) -> Transition:

@@ -44,6 +44,14 @@ def compiled(repeat=1):
     return functools.partial(iterate, stacked([scalars_of(SMALL)]))
 
 
+@functools.cache
+def waiting():
+    """The same, with a critic that learns alone for five iterations."""
+    config = dataclasses.replace(SMALL, critic_iterations=5)
+    iterate = compile_iterations(make_iteration(probe("constant"), LEARNER))
+    return functools.partial(iterate, stacked([scalars_of(config)]))
+
+
 def start(env, seed=0):
     key, key_env, key_nets = jax.random.split(jax.random.key(seed), 3)
     worlds = strong(jax.jit(env.reset)(key_env))
@@ -51,10 +59,10 @@ def start(env, seed=0):
     return stacked([train]), worlds, key[None]
 
 
-def learn(env, iterations, seed=0):
+def learn(env, iterations, seed=0, iterate=None):
     carry, sums = start(env, seed), []
     for _ in range(iterations):
-        *carry, totals = compiled()(*carry)
+        *carry, totals = (iterate or compiled())(*carry)
         sums.append(totals)
     totals = {k: sum(np.asarray(t[k][0]) for t in sums) for k in sums[0]}
     return (member_of(carry[0], 0), *carry[1:]), totals
@@ -123,6 +131,25 @@ def test_best_action_is_found():
 def test_best_action_follows_the_observation():
     (train, *_), _ = learn(probe("seen_action"), 150)
     np.testing.assert_allclose(action_of(train, [-1.0, 1.0]), [-1.0, 1.0], atol=0.15)
+
+
+def test_the_critic_learns_alone_at_first():
+    untrained = member_of(start(probe("target_action"))[0], 0)
+    (train, *_), totals = learn(probe("target_action"), 5, iterate=waiting())
+    assert digest(train.params.policy) == digest(untrained.params.policy)
+    assert digest(train.params.value) != digest(untrained.params.value)
+    rates, updates = totals["learning_rate"]
+    assert rates / updates == pytest.approx(SMALL.learning_rate)
+    (train, *_), after = learn(probe("target_action"), 6, iterate=waiting())
+    assert digest(train.params.policy) != digest(untrained.params.policy)
+    first = (after["learning_rate"][0] - rates) / (after["learning_rate"][1] - updates)
+    highest = SMALL.learning_rate_min * 1.5**8
+    assert SMALL.learning_rate_min <= first <= highest < SMALL.learning_rate
+
+
+def test_a_policy_that_waited_finds_the_best_action():
+    (train, *_), _ = learn(probe("target_action"), 85, iterate=waiting())
+    np.testing.assert_allclose(action_of(train, [0.0]), 0.7, atol=0.1)
 
 
 def test_same_seed_gives_the_same_state_and_another_does_not():
