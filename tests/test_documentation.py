@@ -101,9 +101,13 @@ def test_settings_in_the_training_guide_exist():
     from fingers_mjx.runs.setup import new_setup, overridden
 
     text = (ROOT / "docs/guides/training.md").read_text("utf-8")
-    (given,) = re.findall(r"`--set ([^`]+)`", text)
-    made = overridden(new_setup(TrainConfig(), None), given.split())
-    assert (made.train.num_envs, made.env.curriculum_scale) == (2048, 0.25)
+    found = [
+        overridden(new_setup(TrainConfig(), None), given.split())
+        for given in re.findall(r"`--set ([^`]+)`", text)
+    ]
+    assert len(found) == 2
+    assert found[0].train.num_envs == 2048 and found[0].env.curriculum_scale == 0.25
+    assert found[1].train.ppo.critic_iterations == 100
 
 
 def test_presets_in_the_training_guide_are_those_of_the_code():
