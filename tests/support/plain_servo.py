@@ -40,15 +40,25 @@ def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0005):
     return np.array(angle), np.array(torque)
 
 
-def problem_with(late_s=0.0, known="both", row_s=0.02, push=still):
-    """The equations of one record of it."""
+def problem_with(
+    late_s=0.0, known="both", row_s=0.02, push=still, lost_s=(0.0, 0.0), believed=None
+):
+    """The equations of one record of it; between two times rows are lost.
+
+    `believed` are gains of which nothing is known.
+    """
     t_s = np.arange(0.0, 8.0, row_s)
     cmd = 1.2 * np.sin(2.0 * t_s) * np.cos(0.5 * t_s) + 0.3 * np.sin(7.0 * t_s)
     angle, torque = servo(cmd, row_s, late_s, push)
     columns = {"cmd.servo": cmd, "pos.servo": angle, "tau.servo": torque}
-    log = make_log(("servo",), t_s, columns)
+    kept = (t_s <= lost_s[0]) | (t_s >= lost_s[1])
+    log = make_log(
+        ("servo",), t_s[kept], {name: values[kept] for name, values in columns.items()}
+    )
     friction = {"coulomb_friction": {"torque_nm": Nominal(COULOMB)}}
-    drive = JointDrive(Nominal(KP), Nominal(KD), effects=friction, known=known)
+    kp, kd = believed or (KP, KD)
+    gains = (Nominal(x, free=believed is not None) for x in (kp, kd))
+    drive = JointDrive(*gains, effects=friction, known=known)
     mechanism = model_mechanism(mujoco.MjModel.from_xml_string(ARM), {"servo": drive})
     track = all_tracks([log], mechanism)[0]
     return problem_of(track, [log], mechanism, False)

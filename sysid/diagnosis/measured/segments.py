@@ -43,6 +43,9 @@ FORGOTTEN_S = 0.25
 SHARED = 0.9
 """Share of the targets' rows with an angle above which the rows belong to both."""
 
+EDGE = 3
+"""Steps of the grid within which the smoothing still sees what was before [steps]."""
+
 MIN_PIECE_S = 1.5
 """Shorter pieces of a record are left out [s]."""
 
@@ -67,6 +70,8 @@ class Piece:
         effort: effort in the unit of its column, smoothed; NaN if not logged.
         ext: known push from outside in its unit; zero without.
         valid: where readings support the values.
+        resumed: where targets are known again that were not, and a simulation that did
+            not know them begins anew.
     """
 
     log: int
@@ -82,6 +87,7 @@ class Piece:
     effort: Float[np.ndarray, "n j"]
     ext: Float[np.ndarray, "n j"]
     valid: Bool[np.ndarray, "n j"]
+    resumed: Bool[np.ndarray, "n j"]
 
 
 def grid_step_s(logs: Sequence[MeasuredLog], joints: Sequence[str]) -> float:
@@ -180,7 +186,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
     period = log.timing(names["pos"]).period_s
     fine_s = step_s / every
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
-    columns, valid = {}, np.ones(len(fine), bool)
+    columns, valid, silences = {}, np.ones(len(fine), bool), []
     held = sent = np.zeros((len(fine), 1))
     for key, name in names.items():
         t_s, values = _once(*log.samples(name))
@@ -191,11 +197,16 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
             speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
-            valid &= ~_unlogged_targets(t_s, values, fine, 1.6 * period, speed)
-            valid &= ~_switched_off(log, name, names["pos"], fine)
+            silences += _unlogged_targets(t_s, values, 1.6 * period, speed)
+            silences += _switched_off(log, name, names["pos"])
         else:
             columns[key] = np.interp(fine, t_s, values)
             valid &= _near(t_s, fine, 1.6 * period)
+    resumed = np.zeros(len(fine[::every]), bool)
+    for since, back, until in silences:
+        valid &= (fine <= since) | (fine >= until)
+        if start < back < stop - EDGE * step_s:
+            resumed[int((back - start) / step_s) + EDGE] = True
     sigma = SMOOTH_STEPS * every
     smooth = {k: smoothed(v, sigma)[::every] for k, v in columns.items()}
     slope = [smoothed(columns["pos"], sigma, k)[::every] for k in (1, 2)]
@@ -210,6 +221,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         "effort": smooth.get("effort", none),
         "ext": smooth.get("ext", np.zeros(len(none))),
         "valid": valid[::every],
+        "resumed": resumed,
     }
 
 
@@ -222,43 +234,41 @@ def _once(t_s: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _unlogged_targets(
-    t_s: np.ndarray,
-    values: np.ndarray,
-    grid: np.ndarray,
-    within_s: float,
-    speed: float,
-) -> np.ndarray:
-    """Where targets act that may have been sent but are not in the record.
+    t_s: np.ndarray, values: np.ndarray, within_s: float, speed: float
+) -> list[tuple[float, float, float]]:
+    """When targets may have been sent that are not in the record: from, to, act until.
 
     Behind a limit of the speed a target acts until it is reached.
     """
     silent = np.diff(t_s) > within_s
     moved = silent & (np.diff(values) != 0.0)
-    hidden = np.zeros(len(grid), bool)
+    found = []
     for k in np.flatnonzero(moved):
         underway_s = abs(values[k + 1] - values[k]) / speed
-        stop = t_s[k + 1] + FORGOTTEN_S + underway_s
-        hidden |= (grid > t_s[k]) & (grid < stop)
-    return hidden
+        back = float(t_s[k + 1])
+        found.append((float(t_s[k]), back, back + FORGOTTEN_S + float(underway_s)))
+    return found
 
 
-def _switched_off(log: MeasuredLog, cmd: str, pos: str, grid: np.ndarray) -> np.ndarray:
-    """Where a record that has targets in the rows of its angles has none for long.
+def _switched_off(
+    log: MeasuredLog, cmd: str, pos: str
+) -> list[tuple[float, float, float]]:
+    """When a record that has targets in the rows of its angles has none for long.
 
     There the servo was switched off. Where targets have rows of their own, as messages
     have, silence says that the last one holds.
     """
     sent, read = (np.isfinite(log.columns[name]) for name in (cmd, pos))
-    off = np.zeros(len(grid), bool)
     if np.mean(read[sent]) < SHARED:
-        return off
+        return []
     sent_s = np.append(np.sort(log.t_s[sent]), np.inf)
     alone_s = log.t_s[read & ~sent]
-    for start, stop in itertools.pairwise(sent_s):
+    found = []
+    for start, stop in itertools.pairwise(sent_s.tolist()):
         between = np.any((alone_s > start) & (alone_s < stop))
         if stop - start > FORGOTTEN_S and between:
-            off |= (grid > start) & (grid < stop + FORGOTTEN_S)
-    return off
+            found.append((start, stop, stop + FORGOTTEN_S))
+    return found
 
 
 def _near(t_s: np.ndarray, grid: np.ndarray, within_s: float) -> np.ndarray:

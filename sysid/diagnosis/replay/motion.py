@@ -52,6 +52,7 @@ class Track(Motion):
     Attributes:
         cmd: target, mean over the step that ends there [rad].
         held, sent: the last targets (s) of a step, see `measured.segments.Piece`.
+        resumed: 1 where a simulation begins anew, see `measured.segments.Piece`.
         gravity: in the frame of the mount [m/s²].
         payload_kg: nominal mass of the payload [kg].
         kp, kd: nominal gains [N·m/rad], [N·m·s/rad].
@@ -65,6 +66,7 @@ class Track(Motion):
     cmd: Float[Array, "t p"]
     held: Float[Array, "t s p"]
     sent: Float[Array, "t s p"]
+    resumed: Float[Array, "t p"]
     gravity: Float[Array, "p 3"]
     payload_kg: Float[Array, " p"]
     kp: Float[Array, " p"]

@@ -194,13 +194,13 @@ def _motion(one: _Joint, pull: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _commands(one: _Joint) -> dict[str, np.ndarray]:
-    """Target of all steps, and the last targets with their times."""
+    """Target of all steps, the last targets with their times, and where they resume."""
     last = {
         name: one.stacked(_alike([getattr(p, name)[:, :, one.j] for p in one.pieces]))
         for name in ("held", "sent")
     }
     moved = {name: np.moveaxis(value, 1, 2) for name, value in last.items()}
-    return {"cmd": one.column("cmd")} | moved
+    return {name: one.column(name) for name in ("cmd", "resumed")} | moved
 
 
 def _constants(one: _Joint, logged: np.ndarray) -> dict[str, np.ndarray]:

@@ -3,8 +3,7 @@
     S(M) = Σ_g ‖r_g(θ̂_{−g})‖² + Σ_i ((θ̂_i − θ⁰_i) / σ_i)²
 
 with whitened residuals r_g of fold g, and the second sum over the nuisance parameters.
-The parameters θ̂_{−g} without fold g come from one Gauss-Newton step at the common
-optimum, on all other folds.
+The parameters θ̂_{−g} without fold g are `heldout`'s.
 """
 
 from collections.abc import Sequence
@@ -17,6 +16,7 @@ from jaxtyping import Float
 from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.noise import spring_noise_gain
+from sysid.diagnosis.search.heldout import held_out
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.whitening import correlation_time
 from sysid.least_squares import Fit, Task, fit_all
@@ -193,9 +193,7 @@ def fit_models(
         One model for every start.
 
     Source:
-        Maximum a-posteriori estimate with Gaussian noise and priors; cross-validation:
-        M. Stone, Cross-validatory choice and assessment of statistical predictions,
-        1974. The single Gauss-Newton step per fold is ours.
+        Maximum a-posteriori estimate with Gaussian noise and priors; scores: `heldout`.
     """
     tasks = [_task(problem, s, t) for s, t in zip(sets, starts, strict=True)]
     fits = fit_all(problem.residual, tasks, rounds, shared=shared)
@@ -218,29 +216,17 @@ def _task(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task
 
 
 def _scored(problem, sets, tasks, fits) -> list[Model]:
-    """Predicts every fold from the others."""
-    folds, count = problem.folds(), int(problem.fold.max()) + 1
-    thetas = np.stack(
-        [
-            _without(f, t, folds, g, problem.space.local())
-            for f, t in zip(fits, tasks, strict=True)
-            for g in range(count)
-        ]
-    )
-    squares = problem.residual(thetas) ** 2
-    counted = problem.channel_counts()
-    models = []
-    for k, (effects, fit) in enumerate(zip(sets, fits, strict=True)):
-        mine = squares[k * count : (k + 1) * count]
-        heldout = np.take_along_axis(mine, folds[None], 0)[0].reshape(2, -1)
-        score = float(heldout.sum())
+    """Scores fits by what they predict of each fold from the others."""
+    counted, models = problem.channel_counts(), []
+    predicted = held_out(problem, tasks, fits)
+    each = zip(sets, tasks, fits, predicted, strict=True)
+    for effects, task, fit, held in each:
         errors = np.sum(fit.residual.reshape(2, -1) ** 2, 1) / np.maximum(counted, 1)
-        penalty = _penalty(problem, tasks[k], effects, fit.theta)
-        score = score + penalty if np.isfinite(score) else np.inf
-        kept = thetas[k * count : (k + 1) * count]
+        penalty = _penalty(problem, task, effects, fit.theta)
+        score = held.error + penalty if np.isfinite(held.error) else np.inf
         cost = noise_cost(problem, fit.theta, float(errors[1]))
         tau = _correlation(problem, fit)
-        parts = (score, penalty, kept, errors, cost, tau)
+        parts = (score, penalty, held.theta, errors, cost, tau)
         models.append(Model(tuple(effects), fit, *parts))
     return models
 
@@ -261,24 +247,3 @@ def _penalty(problem: Problem, task: Task, effects, theta: np.ndarray) -> float:
     slots = problem.space.slots
     kept = [i for i in task.free if slots[i].effect not in effects]
     return float(np.sum(((theta - task.center)[kept] / task.deviation[kept]) ** 2))
-
-
-def _without(
-    fit: Fit, task: Task, folds: np.ndarray, g: int, local: list[int]
-) -> np.ndarray:
-    """Estimates the coordinates from the data without one fold.
-
-    What belongs to a record and not to the mechanism stays. The step that a fit would
-    still take on all data is subtracted: it does not come from the fold.
-    """
-    k = fit.free
-    weight = 1.0 / task.deviation[k] ** 2
-    steps = []
-    for kept in (folds != g, np.ones(len(folds), bool)):
-        j, r = fit.jacobian[kept], fit.residual[kept]
-        slope = j.T @ r + weight * (fit.theta - task.center)[k]
-        steps.append(np.linalg.solve(j.T @ j + np.diag(weight), slope))
-    theta = fit.theta.copy()
-    theta[k] = np.clip(theta[k] - steps[0] + steps[1], task.low[k], task.high[k])
-    theta[local] = fit.theta[local]
-    return theta

@@ -98,12 +98,14 @@ def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
 class _Windows:
     """The motion at the end and start of steps, in windows side by side, and targets.
 
-    Those are the mean targets of the substeps.
+    Those are the mean targets of the substeps. Where the record resumes, the joint is
+    where it was measured.
     """
 
     motion: Motion
     before: Motion
     target: Float[Array, "w k l c"]
+    resumed: Float[Array, "w l"]
     track: Track
 
 
@@ -147,20 +149,24 @@ def _simulated(
 
     def step(carry, row):
         before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]
+        states, q, qd, y = carry
+        anew = row[3][:, None] > 0.0
+        q, qd = jnp.where(anew, before.pos, q), jnp.where(anew, before.vel, qd)
 
         def within(i, c):
             share = (i + 0.5) / substeps
             now = jax.tree.map(lambda a, b: a + share * (b - a), before, after)
             return substep(c, now, target[i // each])
 
-        carry = jax.lax.fori_loop(0, substeps, within, carry)
+        carry = jax.lax.fori_loop(0, substeps, within, (states, q, qd, y))
         return carry, carry[3]
 
     first = with_candidates(jax.tree.map(lambda v: v[0], cut.before))
     q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
     states = init_states(chain(first), cut.target[0, 0], q0, dt)
     start = (states, q0, qd0, q0)
-    angles = jax.lax.scan(step, start, (cut.before, cut.motion, cut.target))[1]
+    rows = (cut.before, cut.motion, cut.target, cut.resumed)
+    angles = jax.lax.scan(step, start, rows)[1]
     whole = angles.reshape(window, -1, pieces, count)
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
 
@@ -198,7 +204,9 @@ def _cut(
     motion = replace(motion, push=_unsmoothed(motion.push))
     before = jax.tree.map(cut, _before(motion, dt))
     track = replace(track, **constants)
-    return _Windows(jax.tree.map(cut, motion), before, beside, track)
+    return _Windows(
+        jax.tree.map(cut, motion), before, beside, cut(track.resumed), track
+    )
 
 
 def _unsmoothed(x: Float[Array, "t p"]) -> Float[Array, "t p"]:

@@ -21,6 +21,7 @@ from sysid.diagnosis.search.candidate import (
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.output_error import output_problem
+from sysid.diagnosis.search.output_starts import settled_output
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, extended
@@ -96,9 +97,7 @@ def search(problem: Problem) -> Search:
     problem = coupled(problem, base)
     output = output_problem(problem)
     if output is not None:
-        start = problem.space.nominal
-        problem = output.with_noise(output.raw(start[None])[0])
-        base = fit_models(problem, [()], [start], rounds=10)[0]
+        problem, base = settled_output(output, base)
     found = _searched(problem, base)
     if problem.repeat or not found.best.effects:
         return found

@@ -9,6 +9,7 @@ from sysid.diagnosis.search.candidate import (
     log_likelihood_gain,
 )
 from sysid.diagnosis.search.output_error import OutputProblem
+from sysid.diagnosis.search.output_starts import output_starts
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
 from sysid.diagnosis.search.starts import starts_of
@@ -37,8 +38,7 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     if not isinstance(problem, OutputProblem):
         return _extended(problem, model)
     first = _from_equations(problem, model)
-    # Without an effort all torques together may grow: what that valley took up is left.
-    starts = [at_nominal(problem, m) for m in first]
+    starts = output_starts(problem, model, first)
     models = fit_models(problem, [m.effects for m in first], starts)
     return _simplest_first(problem, model, _ordered(problem, model, models))
 

@@ -40,6 +40,27 @@ def test_the_logged_effort_drives_where_the_law_is_unknown():
     assert error(problem, {"load_friction.drive_share": 0.98}) > 2.0 * right
 
 
+def test_behind_lost_targets_the_simulation_begins_anew():
+    problem = problem_with(row_s=0.004, lost_s=(3.01, 3.13))
+    track, dt = problem.data.track, problem.data.dt
+    (anew,) = np.flatnonzero(np.asarray(track.resumed)[:, 0])
+    assert 3.13 <= anew * dt < 3.15
+    theta = problem.space.nominal.copy()
+    (gain,) = problem.space.of("stiffness")
+    theta[gain] = problem.space.slots[gain].coordinate(0.2)
+
+    def share(problem):
+        """Of the error before that is left two steps behind, of a wrong servo."""
+        angle = simulated(problem, theta[None])[0]
+        away = np.abs(np.asarray(problem.data.track.pos) - angle)[:, 0]
+        return away[anew + 2] / away[anew - 4]
+
+    on = replace(track, resumed=0.0 * track.resumed)
+    assert share(problem) < 0.5
+    assert share(replace(problem, data=replace(problem.data, track=on))) > 0.8
+    assert not np.any(problem_with().data.track.resumed)
+
+
 def test_a_push_from_outside_acts_when_it_does():
     """That of another joint is known from its rows alone: smoothed, and between them
     on straight lines."""

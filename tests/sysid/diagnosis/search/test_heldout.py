@@ -1,0 +1,73 @@
+"""Parameters without a fold: at the optimum of the others, also along a curve."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.optimize import least_squares
+
+from sysid.diagnosis.search import heldout
+from sysid.diagnosis.search.heldout import held_out
+from sysid.least_squares import Task, fit_all
+
+FOLDS = np.repeat([0, 1], [20, 5])
+SIZE = np.full(2, 1.0)
+
+
+def residual(thetas):
+    """The product of both coordinates shows in one fold, the first alone in the other.
+
+    Without the other, the first is what the prior says, along a hyperbola.
+    """
+    a, b = np.asarray(thetas).T
+    rng = np.random.default_rng(0)
+    noise = rng.normal(size=len(FOLDS))
+    both = 30.0 * (a * b - 4.0)[:, None] * np.ones(20)
+    first = 30.0 * (a - 1.0)[:, None] * np.ones(5)
+    return np.concatenate([both, first], 1) + noise
+
+
+PROBLEM = SimpleNamespace(
+    folds=lambda: FOLDS,
+    fold=FOLDS,
+    residual=residual,
+    space=SimpleNamespace(local=lambda: []),
+)
+TASK = Task(
+    start=np.array([1.0, 4.0]),
+    free=np.arange(2),
+    center=np.array([2.0, 2.0]),
+    deviation=SIZE,
+    low=np.full(2, 0.1),
+    high=np.full(2, 10.0),
+)
+
+
+def without(fold):
+    """The optimum without a fold, by another solver."""
+
+    def both(theta):
+        kept = residual(theta[None])[0][fold != FOLDS]
+        return np.concatenate([kept, (theta - TASK.center) / TASK.deviation])
+
+    return least_squares(both, TASK.start, xtol=1e-12, ftol=1e-12).x
+
+
+def predicted():
+    fits = fit_all(residual, [TASK], 20)
+    return held_out(PROBLEM, [TASK], fits)[0]
+
+
+def test_each_fold_is_predicted_from_the_optimum_of_the_others():
+    found = predicted()
+    for fold in (0, 1):
+        np.testing.assert_allclose(found.theta[fold], without(fold), atol=0.1)
+    seen = np.stack([residual(found.theta[g][None])[0] for g in (0, 1)])
+    wanted = sum(np.sum(seen[g][g == FOLDS] ** 2) for g in (0, 1))
+    assert found.error == pytest.approx(wanted)
+
+
+def test_one_step_leaves_the_curve(monkeypatch):
+    """Negative control."""
+    monkeypatch.setattr(heldout, "STEPS", 1)
+    assert np.abs(predicted().theta[1] - without(1)).max() > 0.3
