@@ -16,7 +16,6 @@ import os
 import platform
 import socket
 import subprocess
-import sys
 import time
 import urllib.error
 import urllib.request
@@ -27,6 +26,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 3600.0
 POLL_S = 0.1
+STDERR = 2
 FINGERS = ".venv/bin/fingers"
 COPY, SINGLE = "copy", "runs/first"
 
@@ -120,7 +120,7 @@ def _run(command: list[str], folder: Path) -> None:
         command,
         cwd=folder,
         env=_environment(folder),
-        stdout=sys.stderr,
+        stdout=STDERR,
         check=True,
         timeout=LIMIT_S,
     )
@@ -130,7 +130,7 @@ def _run(command: list[str], folder: Path) -> None:
 def _running(command: list[str], folder: Path) -> Iterator[subprocess.Popen[bytes]]:
     """Starts a command, and ends it at once: how it would stop does not count."""
     process = subprocess.Popen(
-        command, cwd=folder, env=_environment(folder), stdout=sys.stderr
+        command, cwd=folder, env=_environment(folder), stdout=STDERR
     )
     try:
         yield process
