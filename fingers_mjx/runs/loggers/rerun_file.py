@@ -25,7 +25,7 @@ class RerunFile:
     """
 
     def __init__(self, about: About, kept: Kept):
-        import rerun
+        import rerun  # pyright: ignore[reportMissingImports]
 
         self._rerun: Any = rerun
         batches = rerun.ChunkBatcherConfig(flush_tick=BATCH_S)

@@ -39,7 +39,7 @@ class WandbRun:
         mode = _mode()
         if mode == "offline":  # wandb reports on itself over the network even then
             os.environ.setdefault("WANDB_ERROR_REPORTING", "false")
-        import wandb
+        import wandb  # pyright: ignore[reportMissingImports]
 
         self._wandb: Any = wandb
         file = kept.directory / ID_FILE
