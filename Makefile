@@ -9,7 +9,7 @@ LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged
 
 .DEFAULT_GOAL := help
 .PHONY: help sync cuda12 cuda13 format check test test-loggers test-slow test-gpu test-versions demo \
-	notebooks docs battery bench build release clean
+	notebooks docs battery bench compare build release clean
 
 # The ends of what pyproject.toml allows; a version, or the path of an interpreter.
 OLDEST_PYTHON := 3.11
@@ -80,6 +80,9 @@ battery: sync ## Hide effects, ask the diagnosis, count how often it is right (h
 
 bench: sync ## Speed of physics, environment and PPO on this machine
 	$(RUN) python -m benchmarks.speed.throughput
+
+compare: sync ## This project beside its peers, each in an environment of its own (an hour)
+	$(RUN) python -m benchmarks.comparison --out build/comparison
 
 build: sync ## Wheels, installed and tried in an environment of their own
 	rm -rf dist build/trial

@@ -1,5 +1,6 @@
 """The three kinds of measurement: by turns, from the start, and as reported."""
 
+import dataclasses
 import math
 import statistics
 from collections.abc import Callable
@@ -122,14 +123,15 @@ def _start(job: Job, place: Place) -> Found:
 
 
 def _report(job: Job, place: Place) -> Found:
-    """Figures that workers name themselves, until they say `done`."""
+    """Figures that workers name themselves with their peers, until they say `done`."""
     found: Found = []
     for worker in job.workers:
         print(f"{job.name}: {worker.peer}", flush=True)
         try:
             with speaking(worker, job, place) as speaker:
                 while not (said := speaker.hear()).get("done"):
-                    found.append((worker, _figure(said)))
+                    peer = dataclasses.replace(worker, peer=said["peer"])
+                    found.append((peer, _figure(said)))
         except (FailedError, CannotInstallError) as error:
             found.append((worker, _none(job.quantity, "", str(error))))
     return found

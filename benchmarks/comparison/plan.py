@@ -62,9 +62,20 @@ def jobs(device: str) -> tuple[Job, ...]:
     playground = "MuJoCo Playground, Brax PPO"
     fast += (Worker(playground, "playground", "playground_speed"),)
     first += (Worker(playground, "playground", "playground_first"),)
+    mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab_speed")
+    mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
+    unilab = Worker("UniLab, RSL-RL PPO", "unilab", "unilab_first")
+    fits = Worker("mujoco.sysid", "sysid", "sysid_fit")
     speed = "control steps per second of all worlds together"
     until = "seconds from the start of the process to the first PPO iteration done"
     return (
         Job("first", "start", until, first, FIRST_WORLDS[device]),
         *(Job(f"speed-{n}", "turns", speed, fast, n) for n in SIZES[device]),
+        *(
+            Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n)
+            for n in SIZES[device]
+        ),
+        Job("sysid", "report", "parameters of one joint", (fits,), 1),
+        Job("unilab-first", "start", until, (unilab,), FIRST_WORLDS[device]),
+        Job("mjlab-first", "start", until, (mjlab_first,), FIRST_WORLDS[device]),
     )

@@ -1,4 +1,4 @@
-"""A worker as a process: started with its own interpreter, heard line by line."""
+"""A worker as a process: started with its own interpreter, read line by line."""
 
 import json
 import os
