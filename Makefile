@@ -5,10 +5,11 @@ UV := $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := $(UV) run --no-sync
 QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 	tests/test_documentation.py tests/rewards
+LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged_runs.py
 
 .DEFAULT_GOAL := help
-.PHONY: help sync cuda12 cuda13 format check test test-slow test-gpu test-versions demo \
-	notebooks docs battery bench build release clean
+.PHONY: help sync cuda12 cuda13 format check test test-loggers test-slow test-gpu test-versions demo \
+	notebooks docs battery bench compare build release clean
 
 # The ends of what pyproject.toml allows; a version, or the path of an interpreter.
 OLDEST_PYTHON := 3.11
@@ -43,6 +44,10 @@ test: sync ## All tests for two CPU cores
 	$(RUN) pytest tests -n 2 --dist loadfile
 	$(RUN) pytest deploy/tests # alone: some of them run in real time
 
+test-loggers: sync ## The tests of the extras wandb and rerun, which it installs (600 MB)
+	$(UV) sync --locked --inexact --quiet --extra wandb --extra rerun
+	$(RUN) pytest -q $(LOGGERS)
+
 test-slow: sync ## The large versions of the tests; they print their seeds
 	$(UV) sync --locked --inexact --quiet --extra ray
 	$(RUN) pytest -m slow
@@ -75,6 +80,9 @@ battery: sync ## Hide effects, ask the diagnosis, count how often it is right (h
 
 bench: sync ## Speed of physics, environment and PPO on this machine
 	$(RUN) python -m benchmarks.speed.throughput
+
+compare: sync ## This project beside its peers, each in an environment of its own (an hour)
+	$(RUN) python -m benchmarks.comparison --out build/comparison
 
 build: sync ## Wheels, installed and tried in an environment of their own
 	rm -rf dist build/trial

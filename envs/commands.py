@@ -24,6 +24,14 @@ def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"
 
     Source:
         Paper, crawling (ranges); the shares are ours.
+
+    Examples:
+        Without turning, straight or standing ones, all three parts are drawn:
+
+        >>> config = CommandConfig(turning_fraction=0.0, straight_fraction=0.0)
+        >>> command = sample_command(jax.random.key(0), config)
+        >>> command.shape, bool(abs(command[0]) <= 0.16)
+        ((3,), True)
     """
     ranges = (config.vel_x_mps, config.vel_y_mps, config.yaw_rate_rps)
     low, high = jnp.array(ranges).T

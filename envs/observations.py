@@ -57,7 +57,15 @@ def start_history(sample: Sample) -> Sample:
 
 
 def push(history: Sample, sample: Sample) -> Sample:
-    """Drops the oldest sample and appends a new one."""
+    """Drops the oldest sample and appends a new one.
+
+    Examples:
+        >>> zero = Sample(*(jnp.zeros(n) for n in (20, 3, 3, 20)))
+        >>> history = start_history(zero)
+        >>> history = push(history, zero.replace(gravity=jnp.array([0.0, 0.0, -1.0])))
+        >>> print(history.gravity.shape, history.gravity[-1])
+        (8, 3) [ 0.  0. -1.]
+    """
     return jax.tree.map(
         lambda kept, newest: jnp.concatenate([kept[1:], newest[None]]), history, sample
     )

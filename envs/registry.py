@@ -92,6 +92,18 @@ def get_task(name: str) -> Task:
     Raises:
         InputError: there is no task of that name, or the package that brings it is
             broken.
+
+    Examples:
+        >>> task_names()[:4]
+        ('crawl', 'recovery', 'push', 'keyboard')
+        >>> get_task("push").summary
+        'walk to a cube and push it to a target'
+        >>> get_task("push").config().episode_s
+        20.0
+        >>> get_task("pusch")
+        Traceback (most recent call last):
+        fingers_deploy.errors.InputError: task: found pusch; valid: one of crawl,
+        recovery, push, keyboard (did you mean push?)
     """
     if name in _TASKS:
         return _TASKS[name]

@@ -39,6 +39,13 @@ def foot_slide(
 
     Source:
         Isaac Lab, `feet_slide`.
+
+    Examples:
+        Only the tip in contact counts, the one in the air may move:
+
+        >>> tips_vel_w = jnp.array([[0.03, 0.04, 0.0], [0.1, 0.0, 0.0]])
+        >>> print(f"{foot_slide(tips_vel_w, jnp.array([1.0, 0.0])):.2f}")
+        0.05
     """
     speed_mps = safe_norm(tip_vel_w[:, :2])
     return jnp.sum(jnp.where(in_contact(tip_force_n, force_threshold_n), speed_mps, 0))

@@ -38,6 +38,14 @@ def swing_against_command(
 
     Source:
         Paper, "Auxiliary direction objective".
+
+    Examples:
+        Two tips in the air under a command straight ahead: one swings back, one ahead.
+
+        >>> tips_vel_v = jnp.array([[-0.1, 0.0, 0.0], [0.1, 0.0, 0.0]])
+        >>> ahead = jnp.array([0.16, 0.0, 0.0])
+        >>> print(f"{swing_against_command(tips_vel_v, jnp.zeros(2), ahead):.2f}")
+        0.10
     """
     planar = command[:2]
     speed_mps = safe_norm(planar)

@@ -25,6 +25,14 @@ def footprint_departure(
 
     Source:
         Paper, eq. (1).
+
+    Examples:
+        One of five tips stands 2 cm ahead of its target and 1 cm beside it; the way
+        ahead counts a quarter:
+
+        >>> tips_v = jnp.zeros((5, 3)).at[0].set(jnp.array([0.02, 0.01, 0.0]))
+        >>> print(f"{footprint_departure(tips_v, jnp.zeros((5, 3))):.6f}")
+        0.000200
     """
     departure = tip_pos_v - footprint_target_v
     return jnp.sum(jnp.square(departure) * jnp.asarray(axis_stiffness))

@@ -52,6 +52,13 @@ def requested_depth(
 
     Source:
         Paper, keyboard pressing (increasing press depth); the shape is ours.
+
+    Examples:
+        The second of two keys is asked for, and pressed half of its way:
+
+        >>> depth_m, actuation_m = jnp.array([0.0, 0.001]), jnp.array([0.002, 0.002])
+        >>> print(requested_depth(depth_m, actuation_m, jnp.array([0.0, 1.0])))
+        0.5
     """
     return jnp.sum(requested * jnp.clip(depth_m / actuation_m, 0.0, 1.0))
 

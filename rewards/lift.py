@@ -84,6 +84,12 @@ def lift_frequency_hz(
 
     Source:
         Paper, "Auxiliary lift objective".
+
+    Examples:
+        >>> import jax
+        >>> speeds_mps = jnp.array([0.0, 0.09, 0.16])
+        >>> print(jax.vmap(lambda v: lift_frequency_hz(v, LiftParams()))(speeds_mps))
+        [1.   2.25 3.5 ]
     """
     span_mps = params.speed_high_mps - params.speed_low_mps
     t = jnp.clip((speed_mps - params.speed_low_mps) / span_mps, 0.0, 1.0)
@@ -147,6 +153,21 @@ def lift_step(
 
     Source:
         Paper, eq. (2).
+
+    Examples:
+        A thumb that swings at the commanded 2.5 Hz with 0.03 m/s, and lands once in a
+        cycle of 20 steps, is paid in full after 3 s:
+
+        >>> import jax
+        >>> def swing(memory, k):
+        ...     u = 0.03 * jnp.cos(2 * jnp.pi * k / 20) * (jnp.arange(5) == 0)
+        ...     force_n = jnp.where((jnp.arange(5) == 0) & (k % 20 != 5), 0.0, 1.0)
+        ...     command = jnp.array([0.104, 0.0])
+        ...     return lift_step(memory, u, force_n, command, 0.02, LiftParams())
+        >>> start = init_lift_memory()
+        >>> memory, paid = jax.lax.scan(swing, start, jnp.arange(1, 151))
+        >>> print(f"{paid[0]:.3f} {paid[-1]:.3f} m/s")
+        0.000 0.015 m/s
     """
     frequency_hz = lift_frequency_hz(safe_norm(command_planar), params)
     phase, wrapped = _advance(memory.phase, 2.0 * jnp.pi * frequency_hz * dt_s)

@@ -61,6 +61,11 @@ class GeometricDecay:
         ratio: final weight divided by `start`, > 0.
         hold_steps: when the change begins.
         decay_steps: how long it takes, > 0.
+
+    Examples:
+        >>> weight = GeometricDecay(-1.0, ratio=0.1, hold_steps=1000, decay_steps=2000)
+        >>> [f"{weight(steps):.3f}" for steps in (0, 2000, 9000)]
+        ['-1.000', '-0.316', '-0.100']
     """
 
     start: Number

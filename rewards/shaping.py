@@ -24,6 +24,11 @@ def safe_norm(x: Float[Array, "*n d"]) -> Float[Array, "*n"]:
 
     Source:
         The "double where" of JAX's FAQ, "Gradients contain NaN where using where".
+
+    Examples:
+        >>> import jax
+        >>> print(jax.grad(safe_norm)(jnp.zeros(3)))
+        [0. 0. 0.]
     """
     squared = jnp.sum(jnp.square(x), axis=-1)
     zero = squared == 0.0
@@ -46,6 +51,10 @@ def smoothstep(low: Scalar, high: Scalar, x: Float[Array, "*n"]) -> Float[Array,
 
     Source:
         Paper, eq. (2), the function S.
+
+    Examples:
+        >>> print(smoothstep(1.0, 3.0, jnp.array([0.0, 2.0, 4.0])))
+        [0.  0.5 1. ]
     """
     t = jnp.clip((x - low) / (high - low), 0.0, 1.0)
     return jnp.square(t) * (3.0 - 2.0 * t)

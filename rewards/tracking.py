@@ -28,6 +28,17 @@ def track_planar_velocity(
 
     Source:
         Paper, widths; convention of `rewards.shaping.tracking_kernel`.
+
+    Examples:
+        Without error the magnitude is 1; an error of one width leaves 1/e of it.
+
+        >>> import jax.numpy as jnp
+        >>> command = jnp.array([0.16, 0.0, 0.0])
+        >>> for vel_x in (0.16, 0.06):
+        ...     vel_v = jnp.array([vel_x, 0.0, 0.0])
+        ...     print(f"{track_planar_velocity(vel_v, command):.3f}")
+        1.000
+        0.368
     """
     return tracking_kernel(vel_v[:2] - command[:2], width_mps)
 

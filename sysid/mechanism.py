@@ -97,6 +97,13 @@ def hand_mechanism(hand: HandFile | None = None) -> Mechanism:
 
     The command path of the hand file (delay, low-pass, speed limit) and its torque
     limit are effects that the simulation has.
+
+    Examples:
+        >>> mechanism = hand_mechanism()
+        >>> len(mechanism.joints), mechanism.joints[0]
+        (20, 'finger1_joint1')
+        >>> joint_range(mechanism, "finger1_joint1")
+        (0.0475, 1.6033)
     """
     hand = hand or load_hand_file()
     spec = build_spec(hand)

@@ -150,6 +150,15 @@ def load_hand_file(path: str | Path = DEFAULT_HAND_FILE) -> HandFile:
         InputError: not strict YAML; unknown or missing field; wrong type, unit or
             source; number outside its range or interval; wrong joint names or count;
             unknown effect; other schema.
+
+    Examples:
+        >>> hand = load_hand_file()
+        >>> hand.nominal.fingers
+        ('thumb', 'index', 'middle', 'ring', 'little')
+        >>> hand.palm_mass.value, hand.palm_mass.unit, hand.palm_mass.source
+        (0.38908, 'kg', 'paper')
+        >>> hand.per_joint("speed_limit").shape
+        (20,)
     """
     return load_yaml(HandFile, path)
 

@@ -71,6 +71,14 @@ def stance_of(hand: HandFile, stored: Stance | None = None) -> Stance:
 
     Raises:
         InputError: the hand does not stand under these targets.
+
+    Examples:
+        >>> from envs.hand.hand_file import load_hand_file
+        >>> stance = stance_of(load_hand_file())
+        >>> f"palm {1e3 * stance.root_pos_w[2]:.0f} mm above the floor"
+        'palm 127 mm above the floor'
+        >>> stance.qpos.shape, len(stance.footprint_v)
+        ((27,), 5)
     """
     hand = hand.without_effects
     if stored is None and hand.stance:

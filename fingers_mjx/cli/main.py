@@ -51,6 +51,8 @@ _EXTRAS = {
     "viser": "viewer",
     "mjviser": "viewer",
     "trimesh": "viewer",
+    "wandb": "wandb",
+    "rerun": "rerun",
 }
 
 

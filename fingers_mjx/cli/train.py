@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from envs.errors import InputError, one_of
 from fingers_mjx.cli.arguments import options
 from fingers_mjx.cli.machine.jax_ready import prepare_jax
+from fingers_mjx.runs.members import MEMBERS
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -27,8 +28,7 @@ _WORDS = ("task", "preset", "seed", "backend")
 """Settings for which the command line has words of its own."""
 
 MAX_START_BYTES = 64 << 20
-MEMBERS, MOST_SEEDS = "members", 100
-"""Directory of a population's members in its own, and how many there may be."""
+MOST_SEEDS = 100
 
 
 def add(commands) -> None:
@@ -88,6 +88,7 @@ def check(args: argparse.Namespace) -> None:
         InputError: an unknown name or a value out of range; sizes that no machine or
             not this one has room for; or a start that is neither a folder nor a
             regular file.
+        ModuleNotFoundError: a logger that is not installed.
     """
     from fingers_deploy.files import is_folder, open_regular
     from fingers_mjx.training.memory import check_memory
@@ -100,11 +101,20 @@ def check(args: argparse.Namespace) -> None:
     options.check_directory("--out", args.out)
     if args.resume is not None:
         for path in _resumed_paths(args):
-            _resumed(args, path)
+            _check_loggers(_resumed(args, path))
         return
     settings = _new(args, args.backend or "cpu")
+    _check_loggers(settings)
     if args.preset != "adapt":  # sizes that have been trained with
         check_memory(settings.train, args.seeds or 1)
+
+
+def _check_loggers(settings: Settings) -> None:
+    """Refuses loggers that are not installed."""
+    if settings.train.loggers:
+        from fingers_mjx.runs.loggers.choice import check_installed
+
+        check_installed(settings.train.loggers)
 
 
 def _offered(args: argparse.Namespace) -> list[Setting]:

@@ -104,6 +104,8 @@ class TrainConfig:
         checkpoint_every: iterations between two checkpoints.
         keep_checkpoints: newest checkpoints kept on disk.
         video_every: iterations between two videos of the policy; 0 for none.
+        loggers: where the learning curve goes beside JSON and TensorBoard: "wandb",
+            "rerun", or both with a comma between; each is an extra of its own.
         on_overflow: what to do when Warp had no space for all contacts and dropped some
             of them: "stop" with what to set, or "warn" and go on; see
             `envs.physics.room`.
@@ -122,6 +124,7 @@ class TrainConfig:
     checkpoint_every: int = _number(200, 1, MAX_ITERATIONS, free=True)
     keep_checkpoints: int = _number(3, 1, MAX_ITERATIONS, free=True)
     video_every: int = _number(0, 0, MAX_ITERATIONS, free=True)
+    loggers: tuple[Literal["wandb", "rerun"], ...] = _free(())
     on_overflow: Literal["stop", "warn"] = _free("stop")
     hang_limit_s: float = _number(300.0, POSITIVE, free=True)
     ppo: PpoConfig = dataclasses.field(default_factory=PpoConfig)

@@ -165,6 +165,12 @@ def training_curves(
         runs: name of a run to its rows of `metrics.jsonl`.
         metrics: key in the rows to label with unit, in the order of panels.
         x: key of the horizontal axis, which counts environment steps.
+
+    Examples:
+        >>> rows = [{"steps": 1000 * i, "return": 0.1 * i} for i in range(5)]
+        >>> figure = training_curves({"seed 0": rows}, {"return": "return [1]"})
+        >>> figure.axes[0].get_ylabel()
+        'return [1]'
     """
     figure, panels = panels_of(len(metrics), (3.8 * len(metrics), 3.0))
     for axes, (key, label) in zip(panels, metrics.items(), strict=True):

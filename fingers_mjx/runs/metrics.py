@@ -1,56 +1,51 @@
-"""Learning curve on disk: one JSON line per row, and the same as TensorBoard events."""
+"""Learning curve on disk: one JSON line per row; loggers take the same rows."""
 
 import json
 import math
-import struct
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from typing import Any
-
-from tensorboardX.proto.event_pb2 import Event  # pyright: ignore
-from tensorboardX.proto.summary_pb2 import Summary  # pyright: ignore
-from tensorboardX.record_writer import RecordWriter
 
 from envs.errors import InputError
 from fingers_deploy.errors import shortened
 from fingers_deploy.files import open_regular, read_regular
 from fingers_mjx.runs.files import room_for, write_whole
+from fingers_mjx.runs.loggers.base import STEP, TIME, Kept, Logger, Open, Row
+from fingers_mjx.runs.loggers.tensorboard import TensorBoard
 from fingers_mjx.runs.videos import video_files
 
-Row = Mapping[str, Any]
-_STEP, _TIME = "iteration", "time_s"
 _TAIL_BYTES = 1 << 16
 MAX_BYTES = 1 << 28
 
 
 class MetricsLog:
-    """Appends rows to `metrics.jsonl` and to a TensorBoard event file beside it.
+    """Appends rows to `metrics.jsonl`, and gives them to the loggers.
 
     Opened after a restart, it drops the rows later than the iteration that was
-    restored (and a line cut short by a kill), and writes the event file anew from the
-    rows kept, so that the curve goes on without a seam.
+    restored (and a line cut short by a kill), and the loggers begin with the rows kept,
+    so that the curve goes on without a seam.
 
     Args:
         directory: of the run.
         iteration: iterations done when the log is opened.
+        loggers: what opens them; TensorBoard's events if not given.
     """
 
-    def __init__(self, directory: Path, iteration: int):
+    def __init__(
+        self, directory: Path, iteration: int, loggers: Sequence[Open] = (TensorBoard,)
+    ):
         self._path = directory / "metrics.jsonl"
-        rows = [r for r in read_metrics(self._path) if r[_STEP] <= iteration]
+        rows = [r for r in read_metrics(self._path) if r[STEP] <= iteration]
         write_whole(self._path, "".join(map(_line, rows)).encode())
-        events = directory / "events.out.tfevents.0"
-        with room_for(events, 0):
-            self._events = RecordWriter(str(events))
-            events.chmod(0o644)
-            self._write_event(Event(wall_time=0.0, file_version="brain.Event:2"))
-            for row in rows:
-                self._write_event(_event(row))
-            for at, path in video_files(directory).items():
-                if at <= iteration:
-                    self._write_event(_video_event(at, path))
-            self._events.flush()
+        videos = {k: v for k, v in video_files(directory).items() if k <= iteration}
+        kept = Kept(directory, rows, videos)
+        self._loggers: list[Logger] = []
+        with ExitStack() as opened:
+            for begin in loggers:
+                self._loggers.append(begin(kept))
+                opened.callback(self._loggers[-1].close)
+            self._closing = opened.pop_all()
 
     def append(self, row: Row) -> None:
         """Adds one row; it needs "iteration" and "time_s" (seconds since 1970).
@@ -62,11 +57,11 @@ class MetricsLog:
         with room_for(self._path, len(line)):
             with self._path.open("a", encoding="utf-8") as file:
                 file.write(line)
-            self._write_event(_event(row))
-            self._events.flush()
+            for logger in self._loggers:
+                logger.append(row)
 
     def append_video(self, iteration: int, path: Path) -> None:
-        """Adds a video of the policy, which TensorBoard shows among the images.
+        """Adds a video of the policy.
 
         Args:
             iteration: of the policy.
@@ -76,18 +71,14 @@ class MetricsLog:
             OutOfSpace: if the disk is full.
         """
         with room_for(self._path, path.stat().st_size):
-            self._write_event(_video_event(iteration, path))
-            self._events.flush()
+            for logger in self._loggers:
+                logger.append_video(iteration, path)
 
     def __enter__(self) -> "MetricsLog":
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._events.close()
-
-    def _write_event(self, event: Event) -> None:
-        """Appends one event."""
-        self._events.write(event.SerializeToString())
+        self._closing.close()
 
 
 def read_metrics(path: Path) -> list[dict[str, Any]]:
@@ -106,7 +97,7 @@ def read_metrics(path: Path) -> list[dict[str, Any]]:
         except (ValueError, RecursionError):
             break
         row = _row(value)
-        if row is None or type(row.get(_TIME)) not in (int, float):
+        if row is None or type(row.get(TIME)) not in (int, float):
             found = shortened(line)
             raise InputError(path, f"line {number}", found, "a row that training wrote")
         rows.append(row)
@@ -135,7 +126,7 @@ def last_row(path: Path) -> dict[str, Any]:
 
 def _row(value: Any) -> dict[str, Any] | None:
     """Returns what a line holds if it is a row: flat, with its iteration."""
-    if not (isinstance(value, dict) and type(value.get(_STEP)) is int):
+    if not (isinstance(value, dict) and type(value.get(STEP)) is int):
         return None
     flat = all(x is None or isinstance(x, int | float | str) for x in value.values())
     return value if flat else None
@@ -149,26 +140,3 @@ def _line(row: Row) -> str:
 def _number(value: Any) -> Any:
     """Returns `value`, or None for a float that JSON cannot hold."""
     return None if isinstance(value, float) and not math.isfinite(value) else value
-
-
-def _event(row: Row) -> Event:
-    """Returns the numbers of `row` as one TensorBoard event."""
-    numbers = {k: v for k, v in row.items() if isinstance(v, int | float)}
-    values = [
-        Summary.Value(tag=name, simple_value=float(value))
-        for name, value in numbers.items()
-        if name not in (_STEP, _TIME)
-    ]
-    summary = Summary(value=values)
-    return Event(wall_time=row[_TIME], step=row[_STEP], summary=summary)
-
-
-def _video_event(iteration: int, path: Path) -> Event:
-    """Returns a GIF as one TensorBoard event; its size stands in its first bytes."""
-    content = read_regular(path, MAX_BYTES)
-    width, height = struct.unpack("<HH", content[6:10])
-    image = Summary.Image(
-        height=height, width=width, colorspace=3, encoded_image_string=content
-    )
-    summary = Summary(value=[Summary.Value(tag="policy", image=image)])
-    return Event(wall_time=path.stat().st_mtime, step=iteration, summary=summary)

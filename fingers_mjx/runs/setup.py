@@ -93,7 +93,17 @@ def config_digest(directory: Path) -> str:
 
 
 def new_setup(train: TrainConfig, hand_file: Path | None) -> Setup:
-    """Returns the defaults of a task with a hand file, the default hand if None."""
+    """Returns the defaults of a task with a hand file, the default hand if None.
+
+    Examples:
+        The settings of `fingers train crawl --preset cpu --set num_envs=512`, with the
+        default hand:
+
+        >>> from fingers_mjx.ppo.config import preset
+        >>> setup = overridden(new_setup(preset("cpu"), None), ["num_envs=512"])
+        >>> setup.train.num_envs, setup.train.iterations, setup.hand.nominal.fingers[0]
+        (512, 150, 'thumb')
+    """
     hand = load_hand_file(hand_file or DEFAULT_HAND_FILE)
     return with_hand(new_settings(train), hand)
 

@@ -1,7 +1,8 @@
 """A member of a population on disk: an ordinary run directory, and how it ended."""
 
 import json
-from collections.abc import Mapping
+import os
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,6 +13,8 @@ from envs.errors import InputError
 from fingers_mjx.ppo.state import Carry
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.loggers.base import About
+from fingers_mjx.runs.members import MEMBERS
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.errors import Diverged
 
@@ -80,6 +83,23 @@ class Place:
         }
         text = json.dumps(found, indent=1) + "\n"
         write_whole(self.path / END_FILE, text.encode())
+
+
+def about(places: Sequence[Place]) -> list[About]:
+    """Returns what loggers say of members: their names inside what they share."""
+    paths = [place.path.absolute() for place in places]
+    root = Path(os.path.commonpath([path.parent for path in paths]))
+    together = len(places) > 1
+    # The members of `runs/walk` are in `runs/walk/members`.
+    shared = root.parent.name if root.name == MEMBERS else root.name
+    return [
+        About(
+            path.relative_to(root).as_posix(),
+            shared if together else "",
+            to_dict({"train": place.setup.train, "env": place.setup.env}),
+        )
+        for place, path in zip(places, paths, strict=True)
+    ]
 
 
 def read_end(path: Path) -> Diverged | None:

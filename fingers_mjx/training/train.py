@@ -10,13 +10,15 @@ from envs.base import VectorEnv
 from fingers_mjx.ppo.config import check_config, free_fields
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
+from fingers_mjx.runs.loggers.base import Open
+from fingers_mjx.runs.loggers.choice import check_installed, chosen
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
 from fingers_mjx.training.films import Films
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
-from fingers_mjx.training.member import END_FILE, Place, read_end
+from fingers_mjx.training.member import END_FILE, Place, about, read_end
 from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.session import Session, bound
@@ -121,6 +123,7 @@ def train_population(
     check_population(members)
     for member in members:
         check_config(member.setup.train)
+        check_installed(member.setup.train.loggers)
     given = [brought(env, member.setup, member.start) for member in members]
     use_compile_cache()
     with ExitStack() as stack:
@@ -164,7 +167,11 @@ def _run(
         for place in places:
             config = {"train": place.setup.train, "env": place.setup.env}
             record_run(place.path, config, place.bound, place.setup.hand)
-        logs = [stack.enter_context(_curve(one, begin)) for one in files]
+        loggers = [chosen(setups[0].train.loggers, one) for one in about(places)]
+        logs = [
+            stack.enter_context(_curve(one, begin, own))
+            for one, own in zip(files, loggers, strict=True)
+        ]
         films = Films(setups[0].train, places, logs, say)
         stack.callback(films.stop)
         services = LoopServices(
@@ -218,10 +225,11 @@ def _saved(session: Session, places: Sequence[Place], begin: StartPoint) -> Star
     return replace(begin, saved=[place.save(own, 0, 0.0, 1) for place, own in pairs])
 
 
-def _curve(files: Files, begin: StartPoint) -> MetricsLog:
+def _curve(files: Files, begin: StartPoint, loggers: Sequence[Open]) -> MetricsLog:
     """Opens the curve of a member; one that had diverged keeps all its rows."""
     member, path, _, error = files
-    return MetricsLog(path, member.setup.train.iterations if error else begin.iteration)
+    done = member.setup.train.iterations if error else begin.iteration
+    return MetricsLog(path, done, loggers)
 
 
 def _result(path: Path, error: Diverged | None) -> Result:

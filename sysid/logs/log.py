@@ -241,6 +241,19 @@ def make_log(
 
     Source:
         The caller's measurement.
+
+    Examples:
+        Half a second of one joint at 10 Hz, whose fourth position was not read:
+
+        >>> t_s = np.arange(6) / 10
+        >>> pos = np.array([0.0, 0.1, 0.2, np.nan, 0.4, 0.5])
+        >>> log = make_log(("knuckle",), t_s, {"cmd.knuckle": t_s, "pos.knuckle": pos})
+        >>> log.header.units
+        {'cmd': 'rad', 'pos': 'rad'}
+        >>> int(log.missing("pos.knuckle").sum())
+        1
+        >>> log.resampled("pos.knuckle", np.array([0.15])).round(3)
+        array([0.15])
     """
     source = header.pop("source", "log")
     check_columns(source, columns, joints)

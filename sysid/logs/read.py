@@ -31,6 +31,19 @@ def read_log(path: str | Path, bag_map: BagMap | None = None) -> MeasuredLog:
     Raises:
         InputError: not such a file, or its contents are no log.
         ModuleNotFoundError: the optional dependencies `data` are missing.
+
+    Examples:
+        >>> import tempfile
+        >>> import numpy as np
+        >>> from sysid.logs.log import make_log
+        >>> t_s = np.arange(5) / 100
+        >>> with tempfile.TemporaryDirectory() as folder:
+        ...     file = Path(folder) / "knuckle.csv"
+        ...     columns = {"cmd.knuckle": 2 * t_s, "pos.knuckle": t_s}
+        ...     write_log(make_log(("knuckle",), t_s, columns), file)
+        ...     log = read_log(file)
+        >>> print(len(log), log.header.joints, log.column("pos.knuckle")[-1])
+        5 ('knuckle',) 0.04
     """
     file = Path(path)
     folder = is_folder(file)

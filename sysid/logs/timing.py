@@ -61,6 +61,11 @@ def timing(t_s: Float[np.ndarray, " n"], source: object = "log") -> Timing:
 
     Source:
         Ours: the median ignores gaps, as long as fewer than half of the steps are gaps.
+
+    Examples:
+        >>> found = timing(np.array([0.0, 0.1, 0.2, 0.7, 0.8]))
+        >>> found.regular, round(found.period_s, 3), found.parts
+        (False, 0.1, [slice(0, 3, None), slice(3, 5, None)])
     """
     steps = np.diff(t_s)
     forward = steps[steps > 0.0]

@@ -135,7 +135,7 @@ def test_observations_reach_beyond_training(trained):
     assert np.abs(units[OBSERVATIONS:]).max() > 99
 
 
-def _louder(weights, factor):
+def _scaled(weights, factor):
     kernel, bias = weights.layers[-1]
     last = (factor * kernel, factor * bias)
     return replace(weights, layers=(*weights.layers[:-1], last))
@@ -144,10 +144,10 @@ def _louder(weights, factor):
 def test_the_tolerance_grows_with_outputs_before_the_clip(trained, tmp_path):
     """After 900 M steps outputs reach 100; the clip cuts most, float32 rounds all."""
     weights, apply = trained
-    loud = _louder(weights, 100.0)
-    _export(tmp_path / "out", loud, lambda obs: 100.0 * apply(obs))
-    kernel, bias = loud.layers[-1]
-    wrong = replace(loud, layers=(*loud.layers[:-1], (kernel, bias + 0.01)))
+    scaled = _scaled(weights, 100.0)
+    _export(tmp_path / "out", scaled, lambda obs: 100.0 * apply(obs))
+    kernel, bias = scaled.layers[-1]
+    wrong = replace(scaled, layers=(*scaled.layers[:-1], (kernel, bias + 0.01)))
     with pytest.raises(ExportError):
         _export(tmp_path / "wrong", wrong, lambda obs: 100.0 * apply(obs))
 

@@ -120,4 +120,5 @@ def test_only_what_does_not_touch_learning_is_free():
         "on_overflow",
         "hang_limit_s",
         "video_every",
+        "loggers",
     }

@@ -1,0 +1,81 @@
+"""What is measured: jobs, each with the workers that do it, and the seed of all."""
+
+from dataclasses import dataclass
+
+from benchmarks.comparison.peers import OURS
+
+SEED = 0
+SIZES = {"cpu": (64, 256, 512), "gpu": (512, 2048, 8192, 32768)}
+"""Worlds by device."""
+FIRST_WORLDS = {"cpu": 64, "gpu": 2048}
+"""Worlds of the first iteration by device; those of CPUs compile alike."""
+
+
+@dataclass(frozen=True)
+class Worker:
+    """A process that measures.
+
+    Attributes:
+        peer: as the table names it.
+        environment: of which peer it is run in.
+        module: in `benchmarks.comparison.workers`.
+        options: beside those that all workers are given.
+    """
+
+    peer: str
+    environment: str
+    module: str
+    options: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Job:
+    """A measurement of one or more peers.
+
+    Attributes:
+        name: of its rows.
+        kind: `turns` for rates by turns, `start` for seconds from the start of the
+            process to its message, `report` for figures that the workers name.
+        quantity: what the figures are; a worker of `report` names its own.
+        workers: the first is what the others are held against.
+        worlds: stepped side by side.
+    """
+
+    name: str
+    kind: str
+    quantity: str
+    workers: tuple[Worker, ...]
+    worlds: int
+
+
+def ours(module: str, backend: str) -> Worker:
+    """Returns a worker of this project on a physics backend."""
+    named = {"cpu": "C MuJoCo", "jax": "MJX", "warp": "Warp"}[backend]
+    return Worker(f"{OURS} ({named})", OURS, module, ("--backend", backend))
+
+
+def jobs(device: str) -> tuple[Job, ...]:
+    """Returns all measurements that make sense on a device."""
+    backends = ("cpu", "jax") if device == "cpu" else ("warp",)
+    fast = tuple(ours("ours_speed", name) for name in backends)
+    first = (ours("ours_first", backends[0]),)
+    playground = "MuJoCo Playground, Brax PPO"
+    fast += (Worker(playground, "playground", "playground_speed"),)
+    first += (Worker(playground, "playground", "playground_first"),)
+    mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab_speed")
+    mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
+    unilab = Worker("UniLab, RSL-RL PPO", "unilab", "unilab_first")
+    fits = Worker("mujoco.sysid", "sysid", "sysid_fit")
+    speed = "control steps per second of all worlds together"
+    until = "seconds from the start of the process to the first PPO iteration done"
+    return (
+        Job("first", "start", until, first, FIRST_WORLDS[device]),
+        *(Job(f"speed-{n}", "turns", speed, fast, n) for n in SIZES[device]),
+        *(
+            Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n)
+            for n in SIZES[device]
+        ),
+        Job("sysid", "report", "parameters of one joint", (fits,), 1),
+        Job("unilab-first", "start", until, (unilab,), FIRST_WORLDS[device]),
+        Job("mjlab-first", "start", until, (mjlab_first,), FIRST_WORLDS[device]),
+    )

@@ -1,0 +1,22 @@
+"""Brax PPO's first iteration on the hand as an environment of MuJoCo Playground."""
+
+# pyright: reportMissingImports=false
+from importlib.metadata import version
+
+from benchmarks.comparison.workers.playground_hand import HandStand
+from benchmarks.comparison.workers.playground_train import train
+from benchmarks.comparison.workers.report import arguments, say
+
+
+def main() -> None:
+    """Trains one iteration and says so."""
+    args = arguments()
+    impl = "jax" if args.device == "cpu" else "warp"
+    train(HandStand(args.mjcf, impl, args.worlds), args.worlds, args.seed, 1)
+    about = f"playground {version('playground')}, brax {version('brax')}"
+    note = "same hand standing, evaluations off"
+    say(first=True, version=f"{about}, jax {version('jax')}", note=note)
+
+
+if __name__ == "__main__":
+    main()

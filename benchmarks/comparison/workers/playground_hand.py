@@ -1,0 +1,101 @@
+"""The standing hand as an environment of MuJoCo Playground, as its joystick tasks are.
+
+Actions move targets around the stance; the reward asks for a level palm at its height.
+Neither delay, command filter, history nor randomized models: the peer has no part for
+them that all its tasks share.
+"""
+
+# pyright: reportMissingImports=false, reportAttributeAccessIssue=false
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import mujoco
+from ml_collections import config_dict
+from mujoco import mjx
+from mujoco_playground import MjxEnv, State, step
+from mujoco_playground._src.mjx_env import make_data
+
+ACTION_SCALE = 0.3
+ROOM = {"naconmax": 48, "njmax": 128}
+"""Contacts and constraints per world that Warp gets space for, as ours."""
+
+
+class HandStand(MjxEnv):
+    """A hand that shall stand.
+
+    Args:
+        mjcf: the standing hand with its key frame.
+        impl: `jax` or `warp`.
+        worlds: how many there will be, for Warp's buffers.
+    """
+
+    def __init__(self, mjcf: Path, impl: str, worlds: int):
+        config = config_dict.create(
+            ctrl_dt=0.02, sim_dt=0.005, episode_length=1000, action_repeat=1, impl=impl
+        )
+        super().__init__(config)
+        self._path = str(mjcf)
+        self._mj_model = mujoco.MjModel.from_xml_path(self._path)
+        self._mjx_model = mjx.put_model(self._mj_model, impl=impl)
+        key = self._mj_model.keyframe("stance")
+        self._stance, self._held = jnp.array(key.qpos), jnp.array(key.ctrl)
+        room = ROOM | {"naconmax": ROOM["naconmax"] * worlds}
+        self._room = room if impl == "warp" else {}
+
+    def reset(self, rng: jax.Array) -> State:
+        """Starts near the stance."""
+        noise = 0.02 * jax.random.normal(rng, (self.action_size,))
+        data = make_data(
+            self._mj_model,
+            qpos=self._stance.at[7:].add(noise),
+            qvel=jnp.zeros(self._mj_model.nv),
+            ctrl=self._held,
+            impl=self._config.impl,
+            **self._room,
+        )
+        data = mjx.forward(self._mjx_model, data)
+        zero, last = jnp.zeros(()), jnp.zeros(self.action_size)
+        obs = self._seen(data, last)
+        return State(data, obs, zero, zero, {"upright": zero}, {"last": last})
+
+    def step(self, state: State, action: jax.Array) -> State:
+        """Moves the targets and does four physics steps."""
+        targets = self._held + ACTION_SCALE * action
+        data = step(self._mjx_model, state.data, targets, self.n_substeps)
+        height = jnp.abs(data.qpos[2] - self._stance[2])
+        turned = 1.0 - jnp.abs(data.qpos[3:7] @ self._stance[3:7])
+        upright = jnp.exp(-(height / 0.02) - turned / 0.02)
+        fallen = (height > 0.06) | jnp.isnan(data.qpos).any()
+        obs = self._seen(data, action)
+        return state.replace(
+            data=data,
+            obs=obs,
+            reward=upright,
+            done=fallen.astype(jnp.float32),
+            metrics={"upright": upright},
+            info=state.info | {"last": action},
+        )
+
+    def _seen(self, data, last: jax.Array) -> jax.Array:
+        return jnp.concatenate([data.qpos[2:], data.qvel, last])
+
+    @property
+    def xml_path(self) -> str:
+        """Path of the model."""
+        return self._path
+
+    @property
+    def action_size(self) -> int:
+        """Joints."""
+        return self._mj_model.nu
+
+    @property
+    def mj_model(self) -> mujoco.MjModel:
+        """Model."""
+        return self._mj_model
+
+    @property
+    def mjx_model(self) -> mjx.Model:
+        """Model on the device."""
+        return self._mjx_model

@@ -1,0 +1,1 @@
+"""Loggers: where a learning curve goes beside `metrics.jsonl`."""

@@ -1,0 +1,3 @@
+"""Where the members of a population are: run directories inside its own."""
+
+MEMBERS = "members"
