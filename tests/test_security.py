@@ -25,6 +25,10 @@ ROOT = Path(__file__).parents[1]
 SOURCES = ("rewards", "envs", "sysid", "fingers_mjx", "deploy", "benchmarks", "tests")
 MODULES = {"pickle", "cloudpickle", "dill", "joblib", "marshal", "shelve", "torch"}
 CALLS = {"eval", "exec", "yaml.load", "yaml.unsafe_load", "yaml.full_load", "os.system"}
+CALLS |= {"torch.load"}
+PEERS = Path("benchmarks/comparison/workers")
+"""Programs that run in a peer's environment, whose tensors are torch's; they load no
+file with it."""
 
 
 def banned(source):
@@ -52,15 +56,20 @@ def banned_call(node):
         yield f"{name} with shell"
 
 
+def refused(path):
+    """What of it is refused there."""
+    for hit in banned(path.read_text(encoding="utf-8")):
+        if not (path.is_relative_to(ROOT / PEERS) and hit.endswith(": torch")):
+            yield hit
+
+
 def test_sources_keep_to_the_ban_list():
     """X2, over everything but this file."""
     files = [p for name in SOURCES for p in (ROOT / name).rglob("*.py")]
     files = [p for p in files if p != Path(__file__)]
     assert len(files) > 100
     found = {
-        str(p.relative_to(ROOT)): hits
-        for p in files
-        if (hits := list(banned(p.read_text(encoding="utf-8"))))
+        str(p.relative_to(ROOT)): hits for p in files if (hits := list(refused(p)))
     }
     assert found == {}
 
@@ -71,6 +80,7 @@ def test_sources_keep_to_the_ban_list():
         "import pickle",
         "from joblib import load",
         "import torch.nn",
+        "torch.load(path)",
         "eval('1')",
         "yaml.load(text, Loader=yaml.Loader)",
         "np.load(path)",
