@@ -195,12 +195,13 @@ def fit_models(
     Source:
         Maximum a-posteriori estimate with Gaussian noise and priors; scores: `heldout`.
     """
-    tasks = [_task(problem, s, t) for s, t in zip(sets, starts, strict=True)]
+    tasks = [task_of(problem, s, t) for s, t in zip(sets, starts, strict=True)]
     fits = fit_all(problem.residual, tasks, rounds, shared=shared)
     return _scored(problem, sets, tasks, fits)
 
 
-def _task(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task:
+def task_of(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task:
+    """Returns the fit of a model with some effects released."""
     space = problem.space
     prior_sd = space.prior_sds(effects)
     free = np.flatnonzero(prior_sd > 0.0)

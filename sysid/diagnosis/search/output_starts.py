@@ -2,15 +2,26 @@
 
 In closed loop the error of the angle has many optima: a servo whose stiffness is off
 rings at another frequency, and a fit of the angle stays where it began. The equations
-have one optimum and are near the truth, but less exact.
+have one optimum and are near the truth, but less exact. And where an error is large,
+priors count for nothing: what others can take up of it they do, unless the effect is
+fitted alone at first.
 """
+
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import Model, at_nominal, fit_models
+from sysid.diagnosis.search.candidate import (
+    Model,
+    at_nominal,
+    fit_models,
+    task_of,
+)
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.parameters import Space
+from sysid.least_squares import fit_all
 
 
 def settled_output(
@@ -36,33 +47,50 @@ def settled_output(
 
 def output_starts(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
-) -> list[Float[np.ndarray, " n"]]:
-    """Returns for each model of the equations the start that errs least.
+) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
+    """Returns where fits of models of the equations begin: from two places each.
 
-    The effect is as the equations have it; nuisance parameters are at nominal, as in
-    the smaller model, or as in the equations: without an effort all torques together
-    may grow, and in that valley the equations may have gone far.
+    One is near: the effect as the equations have it, with nuisance parameters as in
+    the smaller model or as in the equations, whichever errs less. The other begins at
+    nominal, with the effect fitted alone: without an effort all torques together may
+    grow, and in that valley the near one may have gone far.
 
     Args:
         problem: the error of the angle.
         smaller: the model that lacks an effect, fitted to the angle.
         proposed: models of the equations, each with one effect more.
     """
-    options = [
-        theta
-        for m in proposed
-        for theta in (
-            at_nominal(problem, m),
-            _beside(problem.space, smaller, m),
-            m.fit.theta,
-        )
+    sets, space = [m.effects for m in proposed], problem.space
+    near = np.stack([[_beside(space, smaller, m), m.fit.theta] for m in proposed])
+    errors = np.sum(problem.residual(near.reshape(-1, near.shape[2])) ** 2, 1)
+    penalty = [
+        [_penalty(space, m.effects, x) for x in some]
+        for m, some in zip(proposed, near, strict=True)
     ]
-    errors = np.sum(problem.residual(np.stack(options)) ** 2, 1)
-    sets = [m.effects for m in proposed for _ in range(3)]
-    each = zip(sets, options, errors, strict=True)
-    costs = [e + _penalty(problem.space, s, theta) for s, theta, e in each]
-    best = np.argmin(np.reshape(costs, (-1, 3)), 1)
-    return [options[3 * k + int(i)] for k, i in enumerate(best)]
+    best = np.argmin(errors.reshape(-1, 2) + np.array(penalty), 1)
+    alone = _fitted_alone(problem, sets, [at_nominal(problem, m) for m in proposed])
+    return [
+        start
+        for k, e in enumerate(sets)
+        for start in ((e, near[k, best[k]]), (e, alone[k]))
+    ]
+
+
+def _fitted_alone(
+    problem: OutputProblem,
+    sets: Sequence[tuple[str, ...]],
+    starts: Sequence[Float[np.ndarray, " n"]],
+) -> list[Float[np.ndarray, " n"]]:
+    """Fits the last effect of each model; all else stays where it begins."""
+    tasks = [
+        replace(
+            task_of(problem, effects, start),
+            start=start,
+            free=np.array(problem.space.of(effects[-1])),
+        )
+        for effects, start in zip(sets, starts, strict=True)
+    ]
+    return [fit.theta for fit in fit_all(problem.residual, tasks, 5)]
 
 
 def _beside(space: Space, smaller: Model, larger: Model) -> Float[np.ndarray, " n"]:

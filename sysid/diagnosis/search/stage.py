@@ -38,9 +38,20 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     if not isinstance(problem, OutputProblem):
         return _extended(problem, model)
     first = _from_equations(problem, model)
-    starts = output_starts(problem, model, first)
-    models = fit_models(problem, [m.effects for m in first], starts)
+    sets, starts = zip(*output_starts(problem, model, first), strict=True)
+    models = _best(fit_models(problem, sets, starts))
+    near = models[:REFINED]
+    sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
+    models = _best([*models, *fit_models(problem, sets, starts, rounds=10)])
     return _simplest_first(problem, model, _ordered(problem, model, models))
+
+
+def _best(models: list[Model]) -> list[Model]:
+    """Returns the best fit of every set of effects, nearest to the records first."""
+    best: dict[tuple[str, ...], Model] = {}
+    for m in sorted(models, key=lambda m: m.fit.cost):
+        best.setdefault(m.effects, m)
+    return list(best.values())
 
 
 def _from_equations(problem: OutputProblem, model: Model) -> list[Model]:
@@ -61,11 +72,7 @@ def _extended(problem: Problem, model: Model) -> list[Model]:
     jobs = [(s, t) for s, name in zip(sets, names, strict=True) for t in starts[name]]
     shared = dict(zip(model.fit.free.tolist(), model.fit.jacobian.T, strict=True))
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], shared)
-    best: dict[tuple, Model] = {}
-    for m in models:
-        if m.effects not in best or m.fit.cost < best[m.effects].fit.cost:
-            best[m.effects] = m
-    stage = _refined(problem, model, list(best.values()))
+    stage = _refined(problem, model, _best(models))
     return _simplest_first(problem, model, stage)
 
 
@@ -96,8 +103,7 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
         if m.penalty > OFF_PRIOR_PENALTY
     ]
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=10)
-    models = sorted(models, key=lambda m: -m.fit.cost)
-    again = {m.effects: m for m in models}  # the last one is the best
+    again = {m.effects: m for m in _best(models)}
     return _ordered(problem, smaller, [again.get(m.effects, m) for m in stage])
 
 

@@ -33,13 +33,18 @@ def test_gains_of_which_nothing_is_known_are_found(unknown):
     assert base.errors[1] < 1.5
 
 
-def test_a_candidate_begins_where_it_errs_least(unknown):
+def test_a_candidate_begins_at_two_places(unknown):
     problem, base = settled_output(*unknown)
-    index = problem.space.of("sensor_latency")[0]
+    index = problem.space.of("encoder_offset")[0]
+    others = np.arange(len(base.fit.theta)) != index
     far = problem.space.nominal.copy()
-    far[index] = 0.001 / problem.space.slots[index].scale
-    proposed = fit_models(problem, [("sensor_latency",)], [far], rounds=0)
-    (start,) = output_starts(problem, base, proposed)
-    assert start[index] == far[index]
-    others = np.arange(len(start)) != index
-    np.testing.assert_array_equal(start[others], base.fit.theta[others])
+    far[index] = problem.space.slots[index].coordinate(0.01)
+    proposed = fit_models(problem, [("encoder_offset",)], [far], rounds=0)
+    (_, near), (effects, alone) = output_starts(problem, base, proposed)
+    assert effects == ("encoder_offset",)
+    # Near: the offset of the proposal, all else as in the smaller model.
+    assert near[index] == far[index]
+    np.testing.assert_array_equal(near[others], base.fit.theta[others])
+    # Alone: fitted, all else at nominal.
+    assert alone[index] != far[index]
+    np.testing.assert_array_equal(alone[others], problem.space.nominal[others])
