@@ -40,17 +40,18 @@ MJCF = """
 <mujoco><option timestep="{step}" integrator="implicitfast">
 <flag contact="disable"/></option><worldbody><body name="arm">
 <inertial pos="0 0 -0.1" mass="0.15" diaginertia="1e-4 1e-4 1e-4"/>
-<joint name="servo" axis="0 1 0" armature="{armature}"/></body></worldbody>
+<joint name="servo" axis="0 1 0" armature="{armature}"
+frictionloss="{dry_nm}"/></body></worldbody>
 <actuator><position name="servo" joint="servo" kp="{kp}" kv="{kd}"/></actuator>
 <sensor><jointpos name="pos" joint="servo"/>
 <actuatorfrc name="tau" actuator="servo"/></sensor></mujoco>
 """
 
 
-def mjcf(values: np.ndarray, step_s: float) -> str:
-    """Writes the model."""
+def mjcf(values: np.ndarray, step_s: float, dry_nm: float = 0.0) -> str:
+    """Writes the model, with dry friction if asked for."""
     kp, kd, armature = values
-    return MJCF.format(step=step_s, kp=kp, kd=kd, armature=armature)
+    return MJCF.format(step=step_s, kp=kp, kd=kd, armature=armature, dry_nm=dry_nm)
 
 
 def targets(rng: np.random.Generator, rows: int) -> np.ndarray:
@@ -72,10 +73,12 @@ def lowpass(held: np.ndarray, step_s: float) -> np.ndarray:
     return np.append(held[0], after[:-1])
 
 
-def recorded(true: np.ndarray, rng: np.random.Generator, seconds: float) -> MeasuredLog:
+def recorded(
+    true: np.ndarray, rng: np.random.Generator, seconds: float, dry_nm: float = 0.0
+) -> MeasuredLog:
     """Simulates the truth and writes down what a host sees."""
     rows, every = round(seconds * RATE_HZ), round(1.0 / RATE_HZ / FINE_S)
-    model = mujoco.MjModel.from_xml_string(mjcf(true, FINE_S))
+    model = mujoco.MjModel.from_xml_string(mjcf(true, FINE_S, dry_nm))
     data = mujoco.MjData(model)
     command, seen = targets(rng, rows), np.zeros((rows, 2))
     for step, wanted in enumerate(lowpass(np.repeat(command, every), FINE_S)):
@@ -91,21 +94,27 @@ def recorded(true: np.ndarray, rng: np.random.Generator, seconds: float) -> Meas
     return make_log(("servo",), np.arange(rows) / RATE_HZ, columns)
 
 
-def ours(log: MeasuredLog) -> np.ndarray:
-    """Fits with this project."""
+def ours(log: MeasuredLog, with_friction: bool = False) -> np.ndarray:
+    """Fits with this project, dry friction too if asked for."""
     model = mujoco.MjModel.from_xml_string(mjcf(NOMINAL, STEP_S))
     drive = JointDrive(Nominal(NOMINAL[0]), Nominal(NOMINAL[1]))
     record = joint_record(model_mechanism(model, {"servo": drive}), log, "servo")
     motion = Motion([record], (NOMINAL[0], NOMINAL[1]), 1e6)
     motion.scales = [np.array([NOISE["pos"], NOISE["tau"]])]
-    # Neither delay nor speed limit, nor friction.
+    # Neither delay nor speed limit, nor viscous friction.
     start = np.concatenate([[0.0, 0.0], np.log([1e-9, CUTOFF_HZ, 1e6]), np.zeros(4)])
     wide, steps = np.full(9, 10.0), np.full(9, 0.01)
     task = Task(
-        start, np.array([0, 1, 5]), start, wide, start - wide, start + wide, steps
+        start,
+        np.array([0, 1, 5, *([7] if with_friction else [])]),
+        start,
+        wide,
+        start - wide,
+        start + wide,
+        steps,
     )
     fit = fit_all(motion.residuals, [task], rounds=30)[0]
-    found = np.exp(fit.theta[fit.free])
+    found = np.exp(fit.theta[[0, 1, 5]])
     inertia = float(np.mean(record.neighbours.inertia))
     rest = inertia - NOMINAL[2]
     return np.append(NOMINAL[:2] * found[:2], found[2] * inertia - rest)

@@ -22,7 +22,7 @@ def still(t_s):
     return 0.0 * t_s
 
 
-def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0005):
+def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0001):
     """Angles and torques of a servo without low-pass: read, then the target is sent."""
     q = v = 0.0
     angle, torque = [], []

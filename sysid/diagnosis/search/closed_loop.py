@@ -32,8 +32,12 @@ SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
 
 TARGET_S = 0.001
-"""Longest time for which substeps have one target, its mean [s]: the exact path costs
-more than all else, and a servo that follows means of a millisecond moves alike."""
+"""Longest time for which substeps have one target, its mean [s], where a low-pass is
+slow against it: the exact path costs more than all else. A servo without one, which may
+meet its limit as soon as a target arrives, has a target for each substep."""
+
+SLOW = 12.0
+"""How much longer than that a low-pass with the corner ω at least lasts, 2π / ω."""
 
 WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
@@ -60,7 +64,7 @@ def simulated(
         `envs.actuator.joint`.
     """
     dt = problem.data.dt
-    means = _parts(dt, TARGET_S)
+    means = _parts(dt, _target_s(problem))
     substeps = means * _parts(dt / means, SUBSTEP_S)
     driven = problem.known == "mechanics"
     steps = len(problem.data.track.cmd)
@@ -73,6 +77,13 @@ def simulated(
         angles = _simulated(problem.data.track, params, nuisance, *fixed)
         parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[:count])
     return np.concatenate(parts)
+
+
+def _target_s(problem: Problem) -> float:
+    """Returns for how long targets may be averaged [s]."""
+    path = problem.space.values(problem.space.nominal[None])[0]["lowpass_cutoff"]
+    slow = SLOW * TARGET_S * float(path["cutoff_hz"][0]) < 1.0
+    return TARGET_S if slow else SUBSTEP_S
 
 
 def _parts(whole_s: float, most_s: float) -> int:
@@ -139,13 +150,17 @@ def _simulated(
 
     def substep(carry, now, target):
         states, q, qd, _ = carry
-        around, load = surroundings_at(cut.track, now, q - now.pos, mass, pushed)
-        joint = JointInput(target, q, qd, load, kp, kd, around)
+        # Angles at the middle of a substep, where its mean target is, and speeds at its
+        # ends, with the damping of their mean: right to second order in the substep.
+        middle = q + 0.5 * dt * qd
+        around, load = surroundings_at(cut.track, now, middle - now.pos, mass, pushed)
+        joint = JointInput(target, middle, qd, load, kp, kd, around)
         states, x = chain_step(chain(now), states, joint, dt)
-        x = replace(x, damping=x.damping * (1.0 - float(driven)))
-        moved, qd = joint_step(x, mass * now.inertia, dt)
-        # The chain read the encoder before the joint moved.
-        return states, moved, qd, x.encoder + moved - q
+        x = replace(x, damping=0.5 * x.damping * (1.0 - float(driven)))
+        _, qd = joint_step(x, mass * now.inertia, dt)
+        q = middle + 0.5 * dt * qd
+        # The chain read the encoder before the joint moved on.
+        return states, q, qd, x.encoder + q - middle
 
     def step(carry, row):
         before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]

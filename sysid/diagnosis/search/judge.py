@@ -1,27 +1,39 @@
 """The judge: a cause counts if the simulation with it predicts the motion better.
 
 Equation errors find causes; but an effect may cancel a term of an equation, and then
-the residual shrinks although nothing moves as it did. So the simulation runs with and
-without the effect (`closed_loop`), each time with parameters that were estimated
-without the stretch that is predicted, and without the effect within their tolerances:
-an error that a parameter out of its tolerance would hide is there. With their angle
+the residual shrinks although nothing moves as it did. And an equation of means over
+steps knows no moment at which a limit is met, so what fits it best may not move best.
+So the simulation is fitted to the angle with and without the effect (`closed_loop`),
+each time without the stretch that is predicted, and without the effect within the
+tolerances of its parameters: an error that a parameter out of its tolerance would hide
+is there. With their angle
 errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over blocks of a second,
 
     t = d̄ √B / s_d
 
-must exceed `LEVEL`.
+must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
+parameter that leaves its tolerance.
 """
 
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.replay.band import EVERY, sample_rows
-from sysid.diagnosis.search.candidate import Model, fit_models
+from sysid.diagnosis.search.candidate import (
+    Model,
+    at_nominal,
+    fit_models,
+    log_likelihood_gain,
+)
 from sysid.diagnosis.search.closed_loop import simulated
+from sysid.diagnosis.search.output_error import OutputProblem, output_error
+from sysid.diagnosis.search.output_starts import settled_output
 from sysid.diagnosis.search.parameters import Slot, Space
 from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.search.space import SIGMA
 
 LEVEL = 1.0
@@ -35,25 +47,56 @@ TRIED = 5
 
 
 class Judge:
-    """Compares simulations of one joint; each model is simulated once."""
+    """Compares simulations of one joint; each model is fitted and simulated once.
 
-    def __init__(self, problem: Problem):
-        self.problem = problem
+    Args:
+        problem: to whose residuals models are fitted.
+        base: the nominal model.
+    """
+
+    def __init__(self, problem: Problem, base: Model):
+        self.problem, self.base = problem, base
         self.valid = problem.data.valid & (problem.known != "controller")
         self.errors: dict[int, tuple[Model, np.ndarray]] = {}
         self.bounded: dict[int, tuple[Model, Model]] = {}
+        self.fits: dict[int, tuple[Model, Model]] = {}
 
     @property
     def sees(self) -> bool:
         """Whether there is a motion that can be simulated at all."""
         return bool(self.valid.any())
 
+    @cached_property
+    def output(self) -> Problem:
+        """The error of the angle, of the noise that the nominal model leaves.
+
+        Where the joint cannot follow targets alone, its equations.
+        """
+        if isinstance(self.problem, OutputProblem):
+            return self.problem
+        output = output_error(self.problem)
+        if output is None:
+            return self.problem
+        output, fit = settled_output(output, self.base)
+        self.fits[id(self.base)] = (self.base, fit)
+        return output
+
+    def moved(self, model: Model) -> Model:
+        """Returns a model of the equations fitted to the angle."""
+        output = self.output
+        if output is self.problem:
+            return model
+        if id(model) not in self.fits:
+            starts = [model.fit.theta, at_nominal(output, model)]
+            sets = [model.effects] * len(starts)
+            fits = fit_models(output, sets, starts, rounds=10)
+            self.fits[id(model)] = (model, min(fits, key=lambda m: m.fit.cost))
+        return self.fits[id(model)][1]
+
     def nominal(self, model: Model) -> Model:
-        """Returns a model with its other parameters fitted within their tolerances."""
+        """Returns `moved` with its other parameters fitted within their tolerances."""
         if id(model) not in self.bounded:
-            slots = [_within(s, model.effects) for s in self.problem.space.slots]
-            problem = replace(self.problem, space=Space(tuple(slots)))
-            fit = fit_models(problem, [model.effects], [model.fit.theta])[0]
+            fit = within_tolerances(self.output, self.moved(model))
             self.bounded[id(model)] = (model, fit)
         return self.bounded[id(model)][1]
 
@@ -102,7 +145,22 @@ class Judge:
         """Whether the larger model predicts angles better than the smaller one."""
         if not self.sees:
             return True
-        return self.t_value(self.nominal(smaller), larger) > LEVEL
+        better = self.moved(larger)
+        gain = log_likelihood_gain(self.moved(smaller), better, self.output.samples)
+        nearer = self.t_value(self.nominal(smaller), better) > LEVEL
+        return gain > NOMINAL_THRESHOLD and nearer
+
+
+def within_tolerances(problem: Problem, model: Model) -> Model:
+    """Fits a model with its other parameters within their tolerances.
+
+    Args:
+        problem: to whose residuals.
+        model: where the fit begins.
+    """
+    slots = [_within(s, model.effects) for s in problem.space.slots]
+    bounded = replace(problem, space=Space(tuple(slots)))
+    return fit_models(bounded, [model.effects], [model.fit.theta])[0]
 
 
 def _within(slot: Slot, effects: tuple[str, ...]) -> Slot:

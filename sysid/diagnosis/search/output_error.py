@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import maximum_filter1d
 
 from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
@@ -71,7 +72,8 @@ class OutputProblem(Problem):
         """Takes the noise from the repeats of the error, else from its neighbours.
 
         When a servo takes a target is known to its cycle, so an angle that moves at
-        speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²).
+        speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²),
+        with the largest |v| of three samples about it: a fast servo starts between two.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -83,7 +85,8 @@ class OutputProblem(Problem):
             Ours; as `Problem.with_noise`.
         """
         valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
-        unsure = CYCLE_S * np.abs(np.asarray(self.data.track.vel, float)[rows])
+        speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
+        unsure = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
         if self.repeat:
             series, counts = self.repeat.differences(raw[1], valid)
             size = bulk_deviation(series[counts]) if counts.any() else 1.0
@@ -118,15 +121,24 @@ class OutputProblem(Problem):
 
 
 def output_problem(problem: Problem) -> OutputProblem | None:
-    """Makes the output error of a joint; None where the equations decide.
+    """Makes the output error that decides for a joint; None where the equations do.
 
     They do where efforts were logged, and where a law or a force is not known.
 
     Args:
         problem: the equations' residuals.
     """
+    return None if problem.data.effort.any() else output_error(problem)
+
+
+def output_error(problem: Problem) -> OutputProblem | None:
+    """Makes the output error of a joint; None where it cannot be simulated.
+
+    Args:
+        problem: the equations' residuals.
+    """
     data = problem.data
-    if problem.known != "both" or data.effort.any() or not data.valid.any():
+    if problem.known != "both" or not data.valid.any():
         return None
     same = {f.name: getattr(problem, f.name) for f in fields(Problem)}
     seen = np.stack([np.zeros_like(data.valid), data.valid])

@@ -23,6 +23,12 @@ from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.parameters import Space
 from sysid.least_squares import fit_all
 
+EQUATIONS_TRIED = 3
+"""Number of candidates of a stage that are fitted to the angle as the equations say."""
+
+ALONE_TRIED = 6
+"""The same of those that come nearest to it when they are fitted alone."""
+
 
 def settled_output(
     output: OutputProblem, equations: Model
@@ -31,49 +37,69 @@ def settled_output(
 
     Args:
         output: the error of the angle, of unit noise.
-        equations: the nominal model by the equations.
+        equations: a model by the equations.
+
+    Returns:
+        The problem with its noise, and the model of the same effects.
     """
-    nominal, fitted = output.space.nominal, equations.fit.theta
+    effects = equations.effects
+    fitted = equations.fit.theta
     loose = np.array([np.isinf(slot.prior_sd) for slot in output.space.slots])
-    starts = np.stack([nominal, np.where(loose, fitted, nominal), fitted])
+    begin = at_nominal(output, equations)
+    starts = np.stack([begin, np.where(loose, fitted, begin), fitted])
     raw = output.raw(starts, weigh=False)
     nearest = raw[np.argmin(np.sum(raw**2, (1, 2, 3)))]
     problem = output.with_noise(nearest)
-    models = fit_models(problem, [()] * len(starts), list(starts), rounds=10)
+    models = fit_models(problem, [effects] * len(starts), list(starts), rounds=10)
     theta = min(models, key=lambda m: m.fit.cost).fit.theta
     problem = output.with_noise(output.raw(theta[None], weigh=False)[0])
-    return problem, fit_models(problem, [()], [theta])[0]
+    return problem, fit_models(problem, [effects], [theta])[0]
 
 
 def output_starts(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns where fits of models of the equations begin: from two places each.
+    """Returns where fits of the likeliest models begin: from two places each.
 
     One is near: the effect as the equations have it, with nuisance parameters as in
     the smaller model or as in the equations, whichever errs less. The other begins at
     nominal, with the effect fitted alone: without an effort all torques together may
-    grow, and in that valley the near one may have gone far.
+    grow, and in that valley the near one may have gone far. Those are chosen that come
+    nearest if they are fitted alone, there or in the smaller model, and some that the
+    equations prefer.
 
     Args:
         problem: the error of the angle.
         smaller: the model that lacks an effect, fitted to the angle.
-        proposed: models of the equations, each with one effect more.
+        proposed: models of the equations, each with one effect more, best first.
     """
     sets, space = [m.effects for m in proposed], problem.space
-    near = np.stack([[_beside(space, smaller, m), m.fit.theta] for m in proposed])
-    errors = np.sum(problem.residual(near.reshape(-1, near.shape[2])) ** 2, 1)
-    penalty = [
-        [_penalty(space, m.effects, x) for x in some]
-        for m, some in zip(proposed, near, strict=True)
-    ]
-    best = np.argmin(errors.reshape(-1, 2) + np.array(penalty), 1)
+    beside = [_beside(space, smaller, m) for m in proposed]
+    near = _better(problem, sets, beside, [m.fit.theta for m in proposed])
     alone = _fitted_alone(problem, sets, [at_nominal(problem, m) for m in proposed])
-    return [
-        start
-        for k, e in enumerate(sets)
-        for start in ((e, near[k, best[k]]), (e, alone[k]))
+    added = _fitted_alone(problem, sets, beside)
+    costs = [cost for cost, _ in _better(problem, sets, alone, added)]
+    ranked = np.argsort(costs)[:ALONE_TRIED].tolist()
+    chosen = dict.fromkeys([*range(min(EQUATIONS_TRIED, len(sets))), *ranked])
+    return [(sets[k], start) for k in chosen for start in (near[k][1], alone[k])]
+
+
+def _better(
+    problem: OutputProblem,
+    sets: Sequence[tuple[str, ...]],
+    one: Sequence[Float[np.ndarray, " n"]],
+    other: Sequence[Float[np.ndarray, " n"]],
+) -> list[tuple[float, Float[np.ndarray, " n"]]]:
+    """Returns the cost and coordinates of the better of two, for every set."""
+    both = np.stack([one, other], 1)
+    errors = np.sum(problem.residual(both.reshape(-1, both.shape[2])) ** 2, 1)
+    penalty = [
+        [_penalty(problem.space, effects, x) for x in some]
+        for effects, some in zip(sets, both, strict=True)
     ]
+    costs = errors.reshape(-1, 2) + np.array(penalty)
+    best = np.argmin(costs, 1)
+    return [(float(costs[k, i]), both[k, i]) for k, i in enumerate(best)]
 
 
 def _fitted_alone(

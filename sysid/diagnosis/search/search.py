@@ -7,7 +7,6 @@ far off its prior is a finding and not silently absorbed.
 """
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
@@ -46,6 +45,7 @@ class Search:
         without: for each cause, the model without it.
         rejected: candidates with one effect more, of the last stage, best first.
         samples: number of residuals that count.
+        judge: compares the simulations of its models.
     """
 
     problem: Problem
@@ -55,16 +55,12 @@ class Search:
     without: dict[str, Model]
     rejected: list[Model]
     samples: int
+    judge: Judge
 
     def gain(self, cause: str) -> float:
         """Log-likelihood gain of the best model over that without a cause."""
         without = self.without.get(cause, self.base)
         return log_likelihood_gain(without, self.best, self.samples)
-
-    @cached_property
-    def judge(self) -> Judge:
-        """Compares the simulations of its models."""
-        return Judge(self.problem)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +104,7 @@ def search(problem: Problem) -> Search:
 
 def _searched(problem: Problem, base: Model) -> Search:
     """Searches at a given noise."""
-    best, judge = base, Judge(problem)
+    best, judge = base, Judge(problem, base)
     stage: list[Model] = []
     alternatives: dict[str, list[Model]] = {}
     for _ in range(MOST):
@@ -135,7 +131,7 @@ def _searched(problem: Problem, base: Model) -> Search:
     else:
         best, alternatives, without = exchanged(problem, best, base, judge)
     rejected = [m for m in stage if set(best.effects) < set(m.effects)]
-    parts = (alternatives, without, rejected, problem.samples)
+    parts = (alternatives, without, rejected, problem.samples, judge)
     return Search(problem, base, best, *parts)
 
 

@@ -29,10 +29,6 @@ NESTED_SHARE = 0.015
 gives in dry friction before it slips is less than an encoder resolves."""
 
 
-OUTPUT_TRIED = 6
-"""Number of candidates of a stage that are fitted to the angle."""
-
-
 def extended(problem: Problem, model: Model) -> list[Model]:
     """Adds every effect that a model lacks, best first."""
     if not isinstance(problem, OutputProblem):
@@ -60,7 +56,7 @@ def _from_equations(problem: OutputProblem, model: Model) -> list[Model]:
     assert equations is not None
     if effects not in problem.stages:
         smaller = fit_models(equations, [effects], [model.fit.theta])[0]
-        problem.stages[effects] = _extended(equations, smaller)[:OUTPUT_TRIED]
+        problem.stages[effects] = _extended(equations, smaller)
     return problem.stages[effects]
 
 

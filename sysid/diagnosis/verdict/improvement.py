@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.search.candidate import Model
+from sysid.diagnosis.search.judge import within_tolerances
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
 from sysid.result import Gain
@@ -23,16 +24,18 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
         units: of `position`, `controller` and `mechanics`.
         seed: of the bootstrap over blocks of time.
     """
-    gains, base = {}, found.judge.nominal(found.base)
+    judge, gains = found.judge, {}
+    models = (within_tolerances(found.problem, found.base), found.best)
     for k, name in enumerate(found.problem.channels):
         if found.problem.valid[k].any():
-            before, after = (_heldout(found.problem, m, k) for m in (base, found.best))
+            before, after = (_heldout(found.problem, m, k) for m in models)
             valid = found.problem.valid[k]
             gains[name] = _gain(found.problem, before, after, valid, units[name], seed)
-    if found.judge.sees:
-        before, after = (found.judge.error(m) for m in (base, found.best))
+    if judge.sees:
+        pair = (judge.nominal(found.base), judge.moved(found.best))
+        before, after = (judge.error(m) for m in pair)
         gains["position"] = _gain(
-            found.problem, before, after, found.judge.valid, units["position"], seed
+            found.problem, before, after, judge.valid, units["position"], seed
         )
     return gains
 

@@ -15,6 +15,7 @@ from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.search import Search, settled
 from sysid.diagnosis.search.whitening import bulk_deviation
@@ -53,7 +54,9 @@ def blind(case, limit_nm=None):
     problem = problem_of(all_tracks(logs, mechanism)[0], logs, mechanism, False)
     problem, base = settled(problem)
     samples = int(problem.counts().sum())
-    return blind_effects(Search(problem, base, base, {}, {}, [], samples))
+    return blind_effects(
+        Search(problem, base, base, {}, {}, [], samples, Judge(problem, base))
+    )
 
 
 def most_nm(case) -> float:

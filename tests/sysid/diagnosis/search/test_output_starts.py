@@ -1,12 +1,19 @@
 """Where fits to the angle begin: a servo of which nothing is known still is found."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from support.plain_servo import KD, KP, problem_with
 
 from sysid.diagnosis.search.candidate import fit_models
 from sysid.diagnosis.search.output_error import output_problem
-from sysid.diagnosis.search.output_starts import output_starts, settled_output
+from sysid.diagnosis.search.output_starts import (
+    ALONE_TRIED,
+    EQUATIONS_TRIED,
+    output_starts,
+    settled_output,
+)
 from sysid.diagnosis.search.search import settled
 
 
@@ -48,3 +55,16 @@ def test_a_candidate_begins_at_two_places(unknown):
     # Alone: fitted, all else at nominal.
     assert alone[index] != far[index]
     np.testing.assert_array_equal(alone[others], problem.space.nominal[others])
+
+
+def test_what_comes_near_alone_is_tried_whatever_the_equations_say(unknown):
+    problem, base = settled_output(*unknown)
+    nominal = replace(base, fit=replace(base.fit, theta=problem.space.nominal))
+    names = [e for e in problem.space.effects if e != "stiffness"]
+    sets = [(name,) for name in (*names, "stiffness")]  # best first, by the equations
+    starts = [problem.space.nominal] * len(sets)
+    proposed = fit_models(problem, sets, starts, rounds=0)
+    tried = list(dict.fromkeys(e for e, _ in output_starts(problem, nominal, proposed)))
+    assert tried[:EQUATIONS_TRIED] == sets[:EQUATIONS_TRIED]
+    assert ("stiffness",) in tried  # three times too stiff
+    assert len(tried) <= EQUATIONS_TRIED + ALONE_TRIED < len(sets)

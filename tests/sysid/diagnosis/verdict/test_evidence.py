@@ -25,9 +25,8 @@ def test_sets_are_weighed_against_the_chosen_one():
     base, best = model(score=1600.0), model("deadband", score=1000.0)
     other = model("backlash", score=1020.0)
     more = model("deadband", "armature", score=998.0)
-    found = Search(
-        None, base, best, {"deadband": [other]}, {"deadband": base}, [more], SAMPLES
-    )
+    others = ({"deadband": [other]}, {"deadband": base}, [more])
+    found = Search(None, base, best, *others, SAMPLES, None)
     said = evidence(found)
     assert set(said) == {(), ("deadband",), ("backlash",), ("armature", "deadband")}
     assert said["deadband",] == 0.0
