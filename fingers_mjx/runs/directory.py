@@ -104,7 +104,10 @@ def saved_bound(path: Path) -> dict[str, Any]:
 
 
 def check_bound(
-    path: Path, current: Mapping[str, Any], free: Collection[str] = ()
+    path: Path,
+    current: Mapping[str, Any],
+    free: Collection[str] = (),
+    defaults: Mapping[str, Any] | None = None,
 ) -> None:
     """Raises InputError if the run at `path` was made with something else.
 
@@ -112,13 +115,17 @@ def check_bound(
         path: of the run.
         current: nested names and values that must be the same.
         free: dotted names of values that may differ all the same.
+        defaults: nested names and values of settings that a run may be older than: it
+            did what they do unless they are set.
 
     Raises:
         InputError: naming the first field that differs, its saved and current value.
     """
     saved, now = flat(saved_bound(path)), flat(json.loads(_json(current)))
+    older = flat(json.loads(_json(defaults or {})))
     for name in sorted((saved.keys() | now.keys()) - set(free)):
-        was, found = saved.get(name, "nothing"), now.get(name, "nothing")
+        was = saved.get(name, older.get(name, "nothing"))
+        found = now.get(name, "nothing")
         if was != found:
             valid = f"{was} as saved (--warm-start takes the policy across)"
             raise InputError(path, name, found, valid)

@@ -23,6 +23,17 @@ LAST_S = 300.0
 """How long the end of a run waits for its last video."""
 
 
+def check_drawable(config: TrainConfig) -> None:
+    """Looks for what draws videos, without importing it.
+
+    Raises:
+        ModuleNotFoundError: videos are asked for, and a package is missing.
+    """
+    for name in NEEDED if config.video_every else ():
+        if importlib.util.find_spec(name) is None:
+            raise ModuleNotFoundError(f"No module named {name!r}", name=name)
+
+
 class Films:
     """The videos of a run or a population; one process draws at a time.
 
@@ -31,9 +42,6 @@ class Films:
         places: of the members' files.
         logs: their learning curves.
         note: takes a sentence for the user.
-
-    Raises:
-        ModuleNotFoundError: videos are asked for, and what draws them is missing.
     """
 
     def __init__(
@@ -47,9 +55,6 @@ class Films:
         self._members = list(zip(places, logs, strict=True))
         self._child: subprocess.Popen[str] | None = None
         self._iteration = 0
-        for name in NEEDED if self._every else ():
-            if importlib.util.find_spec(name) is None:
-                raise ModuleNotFoundError(f"No module named {name!r}", name=name)
 
     def due(self, iteration: int) -> bool:
         """Whether a video of this iteration is asked for, and nothing else is drawn."""

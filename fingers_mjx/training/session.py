@@ -4,7 +4,7 @@ A single run is a population of one member.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import MISSING, dataclass, fields, is_dataclass
 from typing import Any
 
 import jax
@@ -190,6 +190,19 @@ def bound(env: VectorEnv, setup: Setup, identity: Mapping[str, Any]) -> dict[str
         "jax": ".".join(jax.__version__.split(".")[:2]),
         "platform": jax.default_backend(),
     }
+
+
+def unset(setup: Setup) -> dict[str, Any]:
+    """Returns the settings of `bound` as they are where nobody sets them."""
+    parts = {"train": setup.train, "env": setup.env}
+    return {name: _defaults(x) for name, x in parts.items() if is_dataclass(x)}
+
+
+def _defaults(config: Any) -> dict[str, Any]:
+    made = {f.name: f.default_factory for f in fields(config)}
+    given = {f.name: f.default for f in fields(config) if f.default is not MISSING}
+    called = {k: make() for k, make in made.items() if make is not MISSING}
+    return to_dict(given | called)
 
 
 def _joined(carries: list[Carry]) -> Carry:

@@ -16,12 +16,12 @@ from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
-from fingers_mjx.training.films import Films
+from fingers_mjx.training.films import Films, check_drawable
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
 from fingers_mjx.training.member import END_FILE, Place, about, read_end
 from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.progress import OnProgress, Ticker
-from fingers_mjx.training.session import Session, bound
+from fingers_mjx.training.session import Session, bound, unset
 from fingers_mjx.training.signals import StopSignals
 from fingers_mjx.training.start import (
     FRESH,
@@ -124,6 +124,7 @@ def train_population(
     for member in members:
         check_config(member.setup.train)
         check_installed(member.setup.train.loggers)
+        check_drawable(member.setup.train)
     given = [brought(env, member.setup, member.start) for member in members]
     use_compile_cache()
     with ExitStack() as stack:
@@ -190,8 +191,8 @@ def _ended(
     ended: list[Diverged | None] = []
     for member, path, facts in zip(members, paths, shared, strict=True):
         if member.start.resume:
-            env = member.setup.env
-            check_bound(path, facts, {f"env.{x}" for x in free_fields(env)})
+            free = {f"env.{x}" for x in free_fields(member.setup.env)}
+            check_bound(path, facts, free, unset(member.setup))
         if len(members) == 1:
             (path / END_FILE).unlink(missing_ok=True)
         ended.append(read_end(path))

@@ -130,6 +130,16 @@ def test_difference_is_named_with_both_values(tmp_path, change, field):
     assert "as saved" in str(error.value)
 
 
+def test_a_run_from_before_a_setting_goes_on_where_that_is_not_set(tmp_path):
+    path = make(tmp_path / "run")
+    newer = BOUND | {"train": {**BOUND["train"], "ppo": {"warm_up": 0}}}
+    check_bound(path, newer, defaults={"train": {"ppo": {"warm_up": 0}}})
+    newer["train"]["ppo"]["warm_up"] = 5
+    with pytest.raises(InputError) as error:
+        check_bound(path, newer, defaults={"train": {"ppo": {"warm_up": 0}}})
+    assert error.value.field == "train.ppo.warm_up"
+
+
 def test_curve_goes_on_from_the_restored_iteration(tmp_path):
     with MetricsLog(tmp_path, 0) as log:
         for iteration in (2, 4, 6):

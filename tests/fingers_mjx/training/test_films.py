@@ -62,6 +62,7 @@ def test_what_draws_is_looked_for_before_training(tmp_path, monkeypatch):
     monkeypatch.setattr(films, "NEEDED", ("there_is_no_such_module",))
     with pytest.raises(ModuleNotFoundError, match="there_is_no_such_module"):
         run(tmp_path / "run", video_every=2)
+    assert not (tmp_path / "run").exists()
 
 
 def test_videos_come_after_whole_calls():
