@@ -1,6 +1,8 @@
 """Bare physics: native batch stepping of the same hand, with nothing of ours around it.
 
-Every world stands in the stance with its joint targets held.
+Every world begins in the stance. Its joint targets are held, or move as they do under
+small random actions: a hand at rest needs one iteration of the contact solver, hands
+that move need several, and on a GPU all worlds wait for the slowest.
 """
 
 from collections.abc import Callable
@@ -8,10 +10,16 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from envs.env import HandEnv
+
+STEPS = 20
+"""Control steps of a call, as of the layers above."""
 
 
 @dataclass(frozen=True)
@@ -29,22 +37,48 @@ class Layer:
     note: str = ""
 
 
-def bare_cpu(env: HandEnv, worlds: int) -> Layer:
+def joint_targets(
+    env: HandEnv, worlds: int, action_std: float
+) -> Float[np.ndarray, "steps b joints"]:
+    """Targets of `STEPS` control steps under random actions, θ ← θ + α tanh(a) [rad].
+
+    Args:
+        env: of whose hand.
+        worlds: how many.
+        action_std: standard deviation of a ~ N(0, σ²) [1]; zero holds the stance.
+
+    Source:
+        `envs.plant.Plant.next_target`.
+    """
+    actions = action_std * jax.random.normal(
+        jax.random.key(1), (STEPS, worlds, env.action_size)
+    )
+    start = jnp.tile(jnp.array(env.stance.target_rad), (worlds, 1))
+
+    def move(target: Any, action: Any) -> tuple[Any, Any]:
+        move_one = jax.vmap(env.plant.next_target, in_axes=(0, 0, None))
+        after = move_one(target, action, env.config.action_scale_rad)
+        return after, after
+
+    return np.asarray(jax.lax.scan(move, start, actions)[1])
+
+
+def bare_cpu(env: HandEnv, worlds: int, action_std: float = 0.0) -> Layer:
     """C MuJoCo's own thread pool over all cores, `mujoco.batch.Batch`."""
     batch = mujoco.batch.Batch(env.mj_model, worlds)
-    batch.qpos = env.stance.qpos
-    substeps, steps = env.plant.n_substeps, 20
-    held = (worlds, substeps, env.mj_model.nu)
-    ctrl = np.broadcast_to(np.array(env.stance.target_rad), held).copy()
+    substeps = env.plant.n_substeps
+    targets = joint_targets(env, worlds, action_std)
+    ctrl = [np.repeat(x[:, None], substeps, axis=1).astype(float) for x in targets]
 
     def call() -> None:
-        for _ in range(steps):
-            batch.rollout(substeps, control=ctrl, record=())
+        batch.qpos, batch.qvel = env.stance.qpos, 0.0
+        for control in ctrl:
+            batch.rollout(substeps, control=control, record=())
 
-    return Layer(call, steps)
+    return Layer(call, STEPS)
 
 
-def bare_warp(env: HandEnv, worlds: int) -> Layer:
+def bare_warp(env: HandEnv, worlds: int, action_std: float = 0.0) -> Layer:
     """MuJoCo Warp without JAX, replaying a CUDA graph of one physics step.
 
     One step and not four: memory that a step allocates while it is recorded is not
@@ -65,14 +99,22 @@ def bare_warp(env: HandEnv, worlds: int) -> Layer:
         mjw.step(model, data)
     wp.synchronize()
     step, note = _recorded(lambda: mjw.step(model, data), model)
-    repeat = 50
+    targets = wp.array(joint_targets(env, worlds, action_std), dtype=float)
+    qpos = wp.array(np.tile(env.stance.qpos, (worlds, 1)), dtype=float)
 
     def call() -> None:
-        for _ in range(repeat * env.plant.n_substeps):
-            step()
+        wp.copy(data.qpos, qpos)
+        data.qvel.zero_()
+        for k in range(STEPS):
+            wp.copy(data.ctrl, targets[k])
+            for _ in range(env.plant.n_substeps):
+                step()
         wp.synchronize()
 
-    return Layer(call, repeat, note)
+    call()
+    used = data.solver_niter.numpy()
+    note += f"; last step: {used.mean():.1f} solver iterations, at most {used.max()}"
+    return Layer(call, STEPS, note)
 
 
 def _replay(graph: Any, kept: object) -> None:

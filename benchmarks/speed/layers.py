@@ -9,15 +9,22 @@ from benchmarks.speed.bare import Layer, bare_cpu, bare_warp
 from envs.batch import BatchEnv
 
 ACTION_STD = 0.3
+MOVING = "bare, moving"
+"""The layer of bare physics whose hands move; not for the backend jax."""
 
 
-def bare_physics(batch: BatchEnv, repeat: int) -> Layer:
+def bare_physics(batch: BatchEnv, repeat: int, action_std: float = 0.0) -> Layer:
     """Native batch stepping; the backend jax has none other than `through_jax`."""
     backend = {"cpu": bare_cpu, "warp": bare_warp}.get(_backend(batch))
     if backend is None:
         return through_jax(batch, repeat)
     env: Any = batch.env
-    return backend(env, batch.num_envs)
+    return backend(env, batch.num_envs, action_std)
+
+
+def bare_moving(batch: BatchEnv, repeat: int) -> Layer:
+    """As `bare_physics`, under random actions as large as those of `environment`."""
+    return bare_physics(batch, repeat, ACTION_STD)
 
 
 def through_jax(batch: BatchEnv, repeat: int) -> Layer:
@@ -87,6 +94,7 @@ def _backend(batch: BatchEnv) -> str:
 
 LAYERS = {
     "bare physics": bare_physics,
+    MOVING: bare_moving,
     "physics through JAX": through_jax,
     "environment": environment,
     "PPO": ppo,

@@ -5,10 +5,10 @@
 
 Prints control steps per second of all worlds together (four physics steps each) and
 the ratio to bare physics, which is native batch stepping: `mujoco.batch.Batch` for cpu,
-MuJoCo Warp replaying a CUDA graph for warp, a scan of `mjx.step` for jax. All layers
-step hands that stand in the stance, with small random actions where a layer takes
-actions. Each number is the median over calls. On warp each layer has a process of its
-own, one after the other; elsewhere they take turns in one process.
+MuJoCo Warp replaying a CUDA graph for warp, a scan of `mjx.step` for jax. Hands begin
+in the stance, or near it; small random actions move them in the environment and in
+PPO, and also in "bare, moving". Each number is the median over calls. On warp each
+layer has a process of its own, one after the other; elsewhere they take turns in one.
 """
 
 import argparse
@@ -29,7 +29,7 @@ import jax
 import mujoco
 
 from benchmarks.speed.bare import Layer
-from benchmarks.speed.layers import LAYERS
+from benchmarks.speed.layers import LAYERS, MOVING
 from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 from envs.rounding import fix_rounding
@@ -45,7 +45,8 @@ def main() -> None:
     args = _arguments()
     worlds = args.num_envs or (8192 if args.backend == "warp" else 256)
     print(f"{worlds} worlds of {args.task}, {machine()}", flush=True)
-    wanted = [(args.backend, name) for name in args.layers or LAYERS]
+    named = args.layers or [x for x in LAYERS if x != MOVING or args.backend != "jax"]
+    wanted = [(args.backend, name) for name in named]
     if args.against:
         wanted.append((args.against, "environment"))
     measure = _apart if args.backend == "warp" and len(wanted) > 1 else _together
@@ -146,12 +147,13 @@ def _ratios(
 ) -> dict[str, float]:
     """Returns how the layers compare, by sentence."""
     ratios = {}
-    if bare := rates.get((backend, "bare physics")):
-        others = {name: rate for (own, name), rate in rates.items() if own == backend}
-        del others["bare physics"]
-        ratios = {f"{name} / bare physics": x / bare for name, x in others.items()}
-    if against and (own := rates.get((backend, "environment"))):
-        factor = own / rates[against, "environment"]
+    own = {name: rate for (of, name), rate in rates.items() if of == backend}
+    bases = [name for name in ("bare physics", MOVING) if name in own]
+    for base in bases:
+        others = {name: rate for name, rate in own.items() if name not in bases}
+        ratios |= {f"{name} / {base}": x / own[base] for name, x in others.items()}
+    if against and "environment" in own:
+        factor = own["environment"] / rates[against, "environment"]
         ratios[f"environment: {backend} / {against}"] = factor
     return ratios
 

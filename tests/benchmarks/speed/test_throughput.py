@@ -34,9 +34,10 @@ def test_throughput_is_measured_and_compared(tmp_path):
     )
     found = json.loads(out.read_text(encoding="utf-8"))
     rates = {(r["backend"], r["layer"]): r["steps_per_s"] for r in found["layers"]}
-    assert len(rates) == 5 and min(rates.values()) > 0
-    ratio = found["ratios"]["environment / bare physics"]
-    assert ratio == rates["cpu", "environment"] / rates["cpu", "bare physics"]
+    assert len(rates) == 6 and min(rates.values()) > 0
+    for bare in ("bare physics", "bare, moving"):
+        ratio = found["ratios"][f"environment / {bare}"]
+        assert ratio == rates["cpu", "environment"] / rates["cpu", bare]
     factor = found["ratios"]["environment: cpu / jax"]
     assert factor == rates["cpu", "environment"] / rates["jax", "environment"]
     assert f"environment: cpu / jax: {factor:.3g}" in done.stdout
