@@ -2,11 +2,15 @@
 
     python -m benchmarks.comparison --out build/comparison
     python -m benchmarks.comparison --out build/comparison --device gpu --only speed
+    python -m benchmarks.comparison --out build/comparison --here --together
     python -m benchmarks.comparison.page benchmarks/results/comparison-cpu.jsonl
 
 Each peer gets an environment of its own from pinned requirements. Measurements that
 have rows for this kind of device are skipped, so that the command goes on where it
 ended. A peer that cannot be installed, or that ends, gets a row with the reason.
+
+On a machine without a network, install the peers beside this project and say `--here`;
+with many cores and little time, `--together` readies the workers of all rates at once.
 """
 
 import argparse
@@ -14,12 +18,15 @@ import os
 import platform
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 
+from benchmarks.comparison.figures import Found
 from benchmarks.comparison.measure import measure, rows
 from benchmarks.comparison.plan import SEED, Job, jobs
 from benchmarks.comparison.process import Place
-from benchmarks.comparison.rows import add_rows, lacking, read_rows
+from benchmarks.comparison.rows import Row, add_rows, lacking, read_rows
+from benchmarks.comparison.turns import by_turns
 from envs.hand.hand_file import load_hand_file
 from envs.hand.standing_mjcf import standing_mjcf
 from fingers_mjx.reports.page import commit_here
@@ -28,18 +35,19 @@ from fingers_mjx.reports.page import commit_here
 def main() -> int:
     """Runs from the command line."""
     args = _arguments()
-    place = Place(args.out.absolute(), args.device)
+    place = Place(args.out.absolute(), args.device, args.here, args.starts)
     place.out.mkdir(parents=True, exist_ok=True)
     place.mjcf.write_text(standing_mjcf(load_hand_file()), encoding="utf-8")
     kept, device = args.out / f"comparison-{args.device}.jsonl", machine(args.device)
+    wanted = [job for job in jobs(args.device) if job.name.startswith(tuple(args.only))]
+    kept_rows = read_rows(kept)
+    for job in wanted:
+        if not lacking(kept_rows, job.name, device):
+            print(f"{job.name}: has its rows", flush=True)
+    lacks = [job for job in wanted if lacking(kept_rows, job.name, device)]
     try:
-        for job in jobs(args.device):
-            if not any(job.name.startswith(name) for name in args.only):
-                continue
-            if lacking(read_rows(kept), job.name, device):
-                add_rows(kept, _measured(job, place, device))
-            else:
-                print(f"{job.name}: has its rows", flush=True)
+        for job, found in _measured(lacks, place, args.together):
+            add_rows(kept, _rows(job, found, place, device))
     except KeyboardInterrupt:
         print("stopped; the same command goes on", file=sys.stderr)
         return 130
@@ -60,11 +68,22 @@ def machine(device: str) -> str:
     return f"{found.stdout.splitlines()[0]}, {cores}"
 
 
-def _measured(job: Job, place: Place, device: str):
+def _measured(
+    lacks: list[Job], place: Place, together: bool
+) -> Iterator[tuple[Job, Found]]:
+    """Measures job after job; `together` readies those of rates at once, and first."""
+    if together:
+        yield from by_turns([job for job in lacks if job.kind == "turns"], place)
+        lacks = [job for job in lacks if job.kind != "turns"]
+    for job in lacks:
+        yield job, measure(job, place)
+
+
+def _rows(job: Job, found: Found, place: Place, device: str) -> list[Row]:
     command = f"python -m benchmarks.comparison --out DIR --device {place.device}"
     shared = {"seed": SEED, "device": device, "commit": commit_here() or "unknown"}
     command += f" --only {job.name}"
-    made = rows(job, measure(job, place), command=command, **shared)
+    made = rows(job, found, command=command, **shared)
     for row in made:
         figure = row.note if row.value is None else f"{row.value:.4g} {row.unit}"
         print(f"{row.job}: {row.peer}: {row.quantity}: {figure}", flush=True)
@@ -77,6 +96,17 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--device", choices=("cpu", "gpu"), default="cpu")
     parser.add_argument(
         "--only", nargs="+", default=[""], metavar="NAME", help="beginnings of names"
+    )
+    parser.add_argument(
+        "--here", action="store_true", help="take peers from this environment; no uv"
+    )
+    parser.add_argument(
+        "--together",
+        action="store_true",
+        help="ready the workers of all rates at once; for machines with many cores",
+    )
+    parser.add_argument(
+        "--starts", type=int, default=3, metavar="N", help="starts of a worker, at most"
     )
     return parser.parse_args()
 

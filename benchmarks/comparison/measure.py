@@ -1,37 +1,14 @@
 """The three kinds of measurement: by turns, from the start, and as reported."""
 
 import dataclasses
-import math
-import statistics
 from collections.abc import Callable
-from contextlib import ExitStack
-from dataclasses import dataclass
 
-from scipy import stats
-
+from benchmarks.comparison.figures import Figure, Found, interval, none
 from benchmarks.comparison.peers import CannotInstallError
-from benchmarks.comparison.plan import Job, Worker
-from benchmarks.comparison.process import FailedError, Place, Speaker, speaking
+from benchmarks.comparison.plan import Job
+from benchmarks.comparison.process import FailedError, Place, speaking
 from benchmarks.comparison.rows import Row
-
-ROUNDS, STARTS = 7, 3
-LEVEL = 0.95
-
-
-@dataclass(frozen=True)
-class Figure:
-    """What was found of one worker; `value` is None where `note` says why."""
-
-    quantity: str
-    unit: str
-    value: float | None
-    low: float | None
-    high: float | None
-    version: str
-    note: str
-
-
-Found = list[tuple[Worker, Figure]]
+from benchmarks.comparison.turns import by_turns
 
 
 def measure(job: Job, place: Place) -> Found:
@@ -39,60 +16,9 @@ def measure(job: Job, place: Place) -> Found:
     return _KINDS[job.kind](job, place)
 
 
-def interval(values: list[float]) -> tuple[float, float, float]:
-    """Returns the geometric mean of positive figures and its interval of 95 %.
-
-    Source:
-        Student's t interval of the logarithms.
-    """
-    logs = [math.log(x) for x in values]
-    middle = statistics.mean(logs)
-    if len(logs) < 2:
-        return math.exp(middle), math.exp(middle), math.exp(middle)
-    error = statistics.stdev(logs) / math.sqrt(len(logs))
-    half = float(stats.t.ppf(0.5 + LEVEL / 2, len(logs) - 1)) * error
-    return math.exp(middle), math.exp(middle - half), math.exp(middle + half)
-
-
 def _turns(job: Job, place: Place) -> Found:
-    """Rates of workers that take turns, so that other work hits them alike.
-
-    The ratio of each to the first is taken round by round.
-    """
-    rates: dict[int, list[float]] = {}
-    about: dict[int, dict] = {}
-    failed: dict[int, str] = {}
-    with ExitStack() as stack:
-        running: dict[int, Speaker] = {}
-        for index, worker in enumerate(job.workers):
-            print(f"{job.name}: {worker.peer} gets ready", flush=True)
-            try:
-                speaker = stack.enter_context(speaking(worker, job, place))
-                about[index], rates[index] = speaker.hear(), []
-                running[index] = speaker
-            except (FailedError, CannotInstallError) as error:
-                failed[index] = str(error)
-        for _ in range(ROUNDS):
-            for index, speaker in list(running.items()):
-                try:
-                    rates[index].append(speaker.ask("go")["rate"])
-                except FailedError as error:
-                    failed[index] = str(error)
-                    del running[index]
-    found = []
-    for index, worker in enumerate(job.workers):
-        if index in failed:
-            found.append((worker, _none(job.quantity, "steps/s", failed[index])))
-            continue
-        version, note = about[index]["version"], about[index]["note"]
-        figures = (*interval(rates[index]), version, note)
-        found.append((worker, Figure(job.quantity, "steps/s", *figures)))
-        if index and 0 in about and 0 not in failed:
-            pairs = zip(rates[index], rates[0], strict=True)
-            ratio = interval([theirs / first for theirs, first in pairs])
-            what = f"rate of {job.workers[0].peer} = 1"
-            found.append((worker, Figure(what, "ratio", *ratio, version, note)))
-    return found
+    """Rates of workers that take turns."""
+    return next(found for _, found in by_turns([job], place))
 
 
 def _start(job: Job, place: Place) -> Found:
@@ -100,7 +26,7 @@ def _start(job: Job, place: Place) -> Found:
     seconds: dict[int, list[float]] = {i: [] for i in range(len(job.workers))}
     about: dict[int, dict] = {}
     failed: dict[int, str] = {}
-    for _ in range(STARTS):
+    for _ in range(min(job.starts, place.starts)):
         for index, worker in enumerate(job.workers):
             if index in failed:
                 continue
@@ -115,7 +41,7 @@ def _start(job: Job, place: Place) -> Found:
     found = []
     for index, worker in enumerate(job.workers):
         if index in failed:
-            found.append((worker, _none(job.quantity, "s", failed[index])))
+            found.append((worker, none(job.quantity, "s", failed[index])))
             continue
         figures = (*interval(seconds[index]), *_said(about[index]))
         found.append((worker, Figure(job.quantity, "s", *figures)))
@@ -133,7 +59,7 @@ def _report(job: Job, place: Place) -> Found:
                     peer = dataclasses.replace(worker, peer=said["peer"])
                     found.append((peer, _figure(said)))
         except (FailedError, CannotInstallError) as error:
-            found.append((worker, _none(job.quantity, "", str(error))))
+            found.append((worker, none(job.quantity, "", str(error))))
     return found
 
 
@@ -152,10 +78,6 @@ def _figure(said: dict) -> Figure:
 
 def _said(said: dict) -> tuple[str, str]:
     return said["version"], said["note"]
-
-
-def _none(quantity: str, unit: str, why: str) -> Figure:
-    return Figure(quantity, unit, None, None, None, "", f"not measured: {why}")
 
 
 _KINDS: dict[str, Callable[[Job, Place], Found]] = {

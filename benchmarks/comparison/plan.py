@@ -10,6 +10,9 @@ SIZES = {"cpu": (64, 256, 512), "gpu": (512, 2048, 8192, 32768)}
 FIRST_WORLDS = {"cpu": 64, "gpu": 2048}
 """Worlds of the first iteration by device; those of CPUs compile alike."""
 
+STAND_WORLDS = {"cpu": 64, "gpu": 4096}
+"""Worlds of the training to a standing policy: those of our presets."""
+
 
 @dataclass(frozen=True)
 class Worker:
@@ -39,6 +42,7 @@ class Job:
         quantity: what the figures are; a worker of `report` names its own.
         workers: the first is what the others are held against.
         worlds: stepped side by side.
+        starts: of each worker, at most.
     """
 
     name: str
@@ -46,6 +50,7 @@ class Job:
     quantity: str
     workers: tuple[Worker, ...]
     worlds: int
+    starts: int = 3
 
 
 def ours(module: str, backend: str) -> Worker:
@@ -54,20 +59,34 @@ def ours(module: str, backend: str) -> Worker:
     return Worker(f"{OURS} ({named})", OURS, module, ("--backend", backend))
 
 
+def playground(module: str, impl: str) -> Worker:
+    """Returns a worker of MuJoCo Playground on an implementation of MJX."""
+    peer = f"MuJoCo Playground, Brax PPO (MJX on {impl})"
+    return Worker(peer, "playground", module, ("--backend", impl))
+
+
 def jobs(device: str) -> tuple[Job, ...]:
     """Returns all measurements that make sense on a device."""
     backends = ("cpu", "jax") if device == "cpu" else ("warp",)
+    impls = ("jax",) if device == "cpu" else ("warp", "jax")
     fast = tuple(ours("ours_speed", name) for name in backends)
-    first = (ours("ours_first", backends[0]),)
-    playground = "MuJoCo Playground, Brax PPO"
-    fast += (Worker(playground, "playground", "playground_speed"),)
-    first += (Worker(playground, "playground", "playground_first"),)
+    first = (ours("ours_first", backends[0]), playground("playground_first", impls[0]))
+    stand = (ours("ours_stand", backends[0]), playground("playground_stand", impls[0]))
+    fast += tuple(playground("playground_speed", impl) for impl in impls)
     mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab_speed")
     mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
+    resumed = (
+        ours("ours_resume", backends[0]),
+        playground("playground_resume", impls[0]),
+        Worker(mjlab.peer, "mjlab", "mjlab_resume"),
+    )
     unilab = Worker("UniLab, RSL-RL PPO", "unilab", "unilab_first")
     fits = Worker("mujoco.sysid", "sysid", "sysid_fit")
     speed = "control steps per second of all worlds together"
     until = "seconds from the start of the process to the first PPO iteration done"
+    stands = (
+        "seconds from the start of the process to ended episodes of 10 s on average"
+    )
     return (
         Job("first", "start", until, first, FIRST_WORLDS[device]),
         *(Job(f"speed-{n}", "turns", speed, fast, n) for n in SIZES[device]),
@@ -75,6 +94,8 @@ def jobs(device: str) -> tuple[Job, ...]:
             Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n)
             for n in SIZES[device]
         ),
+        Job("stand", "start", stands, stand, STAND_WORLDS[device], starts=1),
+        Job("resume", "report", "resumption and export", resumed, 64),
         Job("sysid", "report", "parameters of one joint", (fits,), 1),
         Job("unilab-first", "start", until, (unilab,), FIRST_WORLDS[device]),
         Job("mjlab-first", "start", until, (mjlab_first,), FIRST_WORLDS[device]),

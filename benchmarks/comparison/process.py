@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from benchmarks.comparison.peers import ROOT, python_of
+from benchmarks.comparison.peers import OURS, ROOT, python_of
 from benchmarks.comparison.plan import SEED, Job, Worker
 from benchmarks.comparison.workers.report import MARK
 
@@ -32,10 +32,14 @@ class Place:
     Attributes:
         out: folder of rows, model and environments.
         device: `cpu` or `gpu`.
+        here: whether peers are taken from this very environment.
+        starts: of each worker whose start is measured, at most.
     """
 
     out: Path
     device: str
+    here: bool = False
+    starts: int = 3
 
     @property
     def mjcf(self) -> Path:
@@ -54,8 +58,10 @@ class Speaker:
     """
 
     def __init__(self, worker: Worker, job: Job, place: Place, log):
-        python = python_of(worker.environment, place.out / "environments")
+        environment = OURS if place.here else worker.environment
+        python = python_of(environment, place.out / "environments")
         self.log, self.began_s = log, time.perf_counter()
+        self._out = str(place.out)
         self.process = subprocess.Popen(
             [str(python), *words(worker, job, place)],
             cwd=ROOT,
@@ -95,9 +101,12 @@ class Speaker:
     def _last_words(self) -> str:
         self.process.wait()
         self.log.seek(0)
-        said = [line.strip() for line in self.log.read().split("\n") if line.strip()]
+        text = self.log.read().replace(self._out, "DIR")
+        said = [line.strip() for line in text.split("\n") if line.strip()]
         errors = [line for line in said if re.match(r"[\w.]*(Error|Exception):", line)]
-        last = " ".join((errors or said or ["no word"])[-1:])
+        # The handler of an error may fail itself, and hide why.
+        chained = any("During handling of the above" in line for line in said)
+        last = ", after it ".join((errors or said or ["no word"])[-1 - int(chained) :])
         return f"exit status {self.process.returncode}: {last[:KEPT]}"
 
 
@@ -118,7 +127,7 @@ def words(worker: Worker, job: Job, place: Place) -> list[str]:
     module = f"benchmarks.comparison.workers.{worker.module}"
     given = ["--worlds", str(job.worlds), "--seed", str(SEED)]
     given += ["--device", place.device, "--mjcf", str(place.mjcf)]
-    own = place.out / "work" / job.name / worker.module
+    own = place.out / "written" / job.name / worker.module
     return ["-m", module, *given, "--out", str(own), *worker.options]
 
 

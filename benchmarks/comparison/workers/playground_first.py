@@ -11,7 +11,7 @@ from benchmarks.comparison.workers.report import arguments, say
 def main() -> None:
     """Trains one iteration and says so."""
     args = arguments()
-    impl = "jax" if args.device == "cpu" else "warp"
+    impl = args.backend
     train(HandStand(args.mjcf, impl, args.worlds), args.worlds, args.seed, 1)
     about = f"playground {version('playground')}, brax {version('brax')}"
     note = "same hand standing, evaluations off"

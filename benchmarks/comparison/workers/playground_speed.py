@@ -13,7 +13,7 @@ from benchmarks.comparison.workers.report import STEPS_PER_CALL, arguments, serv
 def main() -> None:
     """Builds the worlds and answers the command."""
     args = arguments()
-    impl = "jax" if args.device == "cpu" else "warp"
+    impl = args.backend
     env = wrapper.wrap_for_brax_training(HandStand(args.mjcf, impl, args.worlds))
     repeat = STEPS_PER_CALL if args.device == "cpu" else 50
 

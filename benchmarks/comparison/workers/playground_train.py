@@ -3,11 +3,33 @@
 # pyright: reportMissingImports=false
 import functools
 
+import jax
+import numpy as np
 from brax.training.agents.ppo import networks
 from brax.training.agents.ppo import train as ppo
 from mujoco_playground import wrapper
 
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
+
+
+def replicated(tree, devices):
+    """Puts a copy of each leaf on each device, as JAX's own function did.
+
+    Source:
+        The replacement in "Migrating to the new jax.pmap" of JAX's documentation;
+        JAX 0.11 has the function no more, and Brax 0.14.2 calls it.
+    """
+    mesh = jax.sharding.Mesh(np.array(devices), ("copies",))
+    spec = jax.sharding.PartitionSpec("copies")
+    sharding = jax.sharding.NamedSharding(mesh, spec)
+    copies = len(devices)
+    return jax.tree.map(
+        lambda x: jax.device_put(np.stack([np.asarray(x)] * copies), sharding), tree
+    )
+
+
+if not hasattr(jax, "device_put_replicated"):
+    jax.device_put_replicated = replicated
 
 
 def train(env, worlds: int, seed: int, iterations: int, **more):

@@ -15,6 +15,17 @@ MARK = "@row "
 STEPS_PER_CALL = 4
 """Control steps of all worlds in one timed call on a CPU, where MJX takes a second."""
 
+STANDING_STEPS = 500
+"""Control steps that ended episodes last on average where hands stand: 10 s."""
+
+DIFFERENCE = "largest difference of a policy's weight, resumed training against whole"
+EXPORT = "largest difference of an action, exported ONNX against training"
+
+
+def largest(one, other) -> float:
+    """Returns the largest absolute difference between two lists of arrays."""
+    return max(float(abs(a - b).max()) for a, b in zip(one, other, strict=True))
+
 
 def arguments() -> argparse.Namespace:
     """Parses what every worker is given."""

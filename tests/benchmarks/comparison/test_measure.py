@@ -1,12 +1,15 @@
 """Measurements survive peers that fail; intervals are those of the logarithms."""
 
+import dataclasses
 import sys
 
 import pytest
 
-from benchmarks.comparison import measure, process
+from benchmarks.comparison import figures, measure, process
+from benchmarks.comparison.peers import OURS
 from benchmarks.comparison.plan import Job, Worker, jobs
 from benchmarks.comparison.process import Place
+from benchmarks.comparison.turns import by_turns
 from benchmarks.comparison.workers.report import MARK
 
 SAYS = f"""
@@ -16,7 +19,13 @@ print({MARK!r} + json.dumps(dict(ready=True, version="1", note="n")), flush=True
 for _ in sys.stdin:
     print({MARK!r} + json.dumps(dict(rate=50.0)), flush=True)
 """
-FAILS = "raise ImportError('needs CUDA')"
+FAILS = """
+import sys
+try:
+    raise ImportError(f"needs CUDA in {sys.argv[1]}")
+except ImportError:
+    raise OSError(9, "hides it")
+"""
 PROGRAMS = {"says": SAYS, "fails": FAILS}
 
 
@@ -24,7 +33,9 @@ PROGRAMS = {"says": SAYS, "fails": FAILS}
 def place(tmp_path, monkeypatch):
     monkeypatch.setattr(process, "python_of", lambda peer, folder: sys.executable)
     monkeypatch.setattr(
-        process, "words", lambda worker, job, place: ["-c", PROGRAMS[worker.module]]
+        process,
+        "words",
+        lambda worker, job, place: ["-c", PROGRAMS[worker.module], str(place.out)],
     )
     return Place(tmp_path, "cpu")
 
@@ -36,19 +47,40 @@ def job(kind):
 
 @pytest.mark.parametrize("kind", ["turns", "start"])
 def test_a_failing_peer_leaves_its_reason_and_the_others_their_figures(place, kind):
-    found = {
-        worker.peer: figure for worker, figure in measure.measure(job(kind), place)
-    }
-    assert found["says"].value > 0.0
-    assert found["fails"].value is None
-    assert "ImportError: needs CUDA" in found["fails"].note
+    (_, says), (_, fails) = measure.measure(job(kind), place)
+    assert says.value and says.value > 0.0
+    assert fails.value is None
+    said = "ImportError: needs CUDA in DIR, after it OSError: [Errno 9] hides it"
+    assert said in fails.note
 
 
 def test_intervals_hold_the_mean_and_widen_with_the_spread():
-    middle, low, high = measure.interval([1.0, 2.0, 4.0])
+    middle, low, high = figures.interval([1.0, 2.0, 4.0])
     assert middle == pytest.approx(2.0)
     assert low < 1.0 and high > 4.0
-    assert measure.interval([2.0, 2.0, 2.0]) == pytest.approx((2.0, 2.0, 2.0))
+    assert figures.interval([2.0, 2.0, 2.0]) == pytest.approx((2.0, 2.0, 2.0))
+
+
+def test_rates_of_several_jobs_are_taken_after_all_are_ready(place):
+    jobs = [dataclasses.replace(job("turns"), name=name) for name in ("a", "b")]
+    found = {one.name: figures for one, figures in by_turns(jobs, place)}
+    assert list(found) == ["a", "b"]
+    for (_, says), (_, fails) in found.values():
+        assert says.value and says.value > 0.0
+        assert fails.value is None
+
+
+def test_peers_can_be_taken_from_this_environment(tmp_path, monkeypatch):
+    asked = []
+    monkeypatch.setattr(
+        process, "python_of", lambda peer, folder: asked.append(peer) or sys.executable
+    )
+    worker = Worker("peer", "playground", "report")
+    for here in (False, True):
+        where = Place(tmp_path, "cpu", here)
+        with process.speaking(worker, job("start"), where):
+            pass
+    assert asked == ["playground", OURS]
 
 
 @pytest.mark.parametrize("device", ["cpu", "gpu"])
