@@ -1,0 +1,35 @@
+"""The sweeps that test the paper's claims can begin, and differ in rewards alone."""
+
+from pathlib import Path
+
+import pytest
+
+from envs.config.typed import load_yaml
+from fingers_mjx.studies.sweep.resolve import keep_sweep
+from fingers_mjx.studies.sweep.spec import Sweep
+
+CLAIMS = Path(__file__).resolve().parents[2] / "benchmarks/claims"
+MEMBERS = {"ablation": (6, 12), "tuned_stock": (24, 2), "weights": (8, 6)}
+
+
+def swept(name):
+    return load_yaml(Sweep, CLAIMS / f"{name}.yaml")
+
+
+@pytest.mark.parametrize("name", MEMBERS)
+def test_the_sweeps_can_begin(tmp_path, name):
+    made = keep_sweep(swept(name), CLAIMS / f"{name}.yaml", tmp_path)
+    configurations, seeds = MEMBERS[name]
+    assert (len(made.configurations), len(made.seeds)) == (configurations, seeds)
+
+
+def test_only_rewards_differ():
+    for name in ("tuned_stock", "weights"):
+        extra = {"env.rewards": "stock"} if name == "tuned_stock" else {}
+        assert dict(swept(name).set) == dict(swept("ablation").set) | extra
+        assert swept(name).evaluate == swept("ablation").evaluate
+    for name in ("ablation", "weights"):
+        for changes in swept(name).configurations.values():
+            assert all(
+                key.startswith(("env.weights.", "env.rewards")) for key in changes
+            )
