@@ -41,7 +41,7 @@ check: sync ## What CI runs first: style, types, quick tests; changes nothing
 	$(RUN) pytest -q -n 2 $(QUICK)
 
 test: sync ## All tests for two CPU cores
-	$(RUN) pytest tests -n 2 --dist loadfile
+	$(RUN) pytest tests -n 2 --dist loadfile --max-worker-restart 0 # a crash ends it
 	$(RUN) pytest deploy/tests # alone: some of them run in real time
 
 test-loggers: sync ## The tests of the extras wandb and rerun, which it installs (600 MB)

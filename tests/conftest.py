@@ -1,8 +1,10 @@
 """Runs shape annotations as checks, and watches the interpreter (X1, X3)."""
 
+import gc
 import sys
 from pathlib import Path
 
+import jax
 import pytest
 from jaxtyping import config, install_import_hook
 from support import shapes
@@ -19,6 +21,13 @@ install_import_hook(SHAPED, CHECKER)
 NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
 UNSAFE = ("pickle.find_class", "os.system")
 LOOPBACK = ("127.0.0.1", "::1", "localhost", "")
+
+
+MAPS = Path("/proc/self/maps")
+MOST_MAPS = 25_000
+"""Mapped regions with which a process begins a file of tests: every compiled program has
+dozens, and where Linux has no more, after 65,530, the next program is a segmentation
+fault."""
 
 
 class Watch:
@@ -60,6 +69,14 @@ def shapes_are_checked(request):
     """Checks arrays where a package tests itself; elsewhere it would only take time."""
     rooms = request.path.relative_to(Path(__file__).parent).parts
     config.update("jaxtyping_disable", rooms[0] not in SHAPED)
+
+
+@pytest.fixture(autouse=True, scope="module")
+def room_for_programs():
+    """Forgets the programs of the files before, where they have become too many."""
+    if MAPS.exists() and len(MAPS.read_bytes().splitlines()) > MOST_MAPS:
+        jax.clear_caches()
+        gc.collect()
 
 
 @pytest.fixture(autouse=True)
