@@ -25,9 +25,9 @@ LOOPBACK = ("127.0.0.1", "::1", "localhost", "")
 
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 25_000
-"""Mapped regions with which a process begins a file of tests: every compiled program has
-dozens, and where Linux has no more, after 65,530, the next program is a segmentation
-fault."""
+"""Mapped regions with which a process begins a file of tests: every compiled program
+has dozens, and where Linux has no more, after 65,530, the next program is a
+segmentation fault."""
 
 
 class Watch:

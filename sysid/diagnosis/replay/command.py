@@ -78,24 +78,15 @@ def command_path(
     Source:
         Ours; exact response of a first-order low-pass to held targets.
     """
-    given = {name: value for name, value in params.items() if name in EFFECTS}
-    count = next(x for v in params.values() for x in v.values()).shape[0]
-
-    def value(effect: str, name: str, absent: float) -> Float[Array, " c"]:
-        return given[effect][name] if effect in given else jnp.full(count, absent)
-
-    grid = value("command_quantization", "step_rad", 0.0)
-    cutoff = value("lowpass_cutoff", "cutoff_hz", jnp.inf)
-    speed = value("slew_limit", "speed_rad_s", jnp.inf)
-    age = value("transport_delay", "delay_s", 0.0)
-    age = (age + value("sensor_latency", "latency_s", 0.0)) / dt
-    whole = jnp.floor(age)
+    grid, age = _grid(params), _age(params, dt)
+    cutoff = _value(params, "lowpass_cutoff", "cutoff_hz", jnp.inf)
+    speed = _value(params, "slew_limit", "speed_rad_s", jnp.inf)
     lag_s = 1.0 / (2.0 * jnp.pi * cutoff)
 
     def step(carry, row):
         smooth, command = carry
         targets, times = row
-        begin = jnp.clip(times[..., None] + (age - whole) + 1.0, 0.0, 1.0)
+        begin = jnp.clip(times[..., None] + age % 1.0 + 1.0, 0.0, 1.0)
         begin = begin.at[0].set(0.0)
         parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
         total, passed = jnp.zeros_like(command), command
@@ -117,16 +108,67 @@ def command_path(
         return (smooth, command), (command, total, command - passed)
 
     first = quantized(held[0, 0][:, None], grid)
-    first = jnp.broadcast_to(first, (held.shape[2], count))
+    first = jnp.broadcast_to(first, (held.shape[2], len(age)))
     path, mean, ahead = jax.lax.scan(step, (first, first), (held, sent))[1]
-    t_s = dt * jnp.arange(len(held))[:, None]
-    drift = 1e-6 * value("clock_drift", "drift_ppm", 0.0)
-    steps = whole + drift * t_s / dt
+    steps = _steps_late(params, len(held), dt)
     place = jnp.arange(len(path))[:, None] - jnp.round(steps)
     place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
     ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
     late = [_late(x, steps) for x in (path, mean, _ripple(path, mean))]
     return Commands(late[0], late[1], late[2], ahead)
+
+
+def held_command(
+    held: Float[Array, "t s p"], sent: Float[Array, "t s p"], params: Params, dt: float
+) -> Float[Array, "t p c"]:
+    """`command_path(…).mean` without low-pass and limit of speed, much faster.
+
+        c̄ = Σ_i w_i round(u_i),   w_i the share of the step that target u_i is held
+
+    Args:
+        held: the last targets u before the end of every step, in their order [rad].
+        sent: when they were sent before that end, negative [steps].
+        params: values of the parameters by effect; effects may be missing.
+        dt: step of the grid [s].
+
+    Returns:
+        Mean commands of the steps [rad].
+
+    Source:
+        Ours: such a command does not depend on where it was, so no step waits for the
+        one before.
+    """
+    grid, age = _grid(params), _age(params, dt)
+    mean, begin = jnp.zeros((len(held), held.shape[2], len(age))), 0.0
+    for i in range(held.shape[1]):
+        # The first target has been there before, and the last is to stay.
+        last = i == held.shape[1] - 1
+        end = 1.0 if last else jnp.clip(sent[:, i + 1, :, None] + age % 1.0 + 1.0, 0, 1)
+        mean += (end - begin) * quantized(held[:, i, :, None], grid)
+        begin = end
+    return _late(mean, _steps_late(params, len(held), dt))
+
+
+def _value(params: Params, effect: str, name: str, absent: float) -> Float[Array, " c"]:
+    """Returns a parameter of all candidates; what it is where the effect is missing."""
+    count = next(x for v in params.values() for x in v.values()).shape[0]
+    return params[effect][name] if effect in params else jnp.full(count, absent)
+
+
+def _grid(params: Params) -> Float[Array, " c"]:
+    return _value(params, "command_quantization", "step_rad", 0.0)
+
+
+def _age(params: Params, dt: float) -> Float[Array, " c"]:
+    """How old targets are when they act, as readings see it [steps]."""
+    delay_s = _value(params, "transport_delay", "delay_s", 0.0)
+    return (delay_s + _value(params, "sensor_latency", "latency_s", 0.0)) / dt
+
+
+def _steps_late(params: Params, count: int, dt: float) -> Float[Array, "t c"]:
+    """Whole steps by which the path is read later, and what the clocks drift apart."""
+    drift = 1e-6 * _value(params, "clock_drift", "drift_ppm", 0.0)
+    return jnp.floor(_age(params, dt)) + drift * jnp.arange(count)[:, None]
 
 
 def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):

@@ -15,18 +15,17 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
-from sysid.diagnosis.replay import band, command
-from sysid.diagnosis.replay.command import command_path
+from sysid.diagnosis.replay import band
+from sysid.diagnosis.replay.command import command_path, held_command
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.parameters import Space
-from sysid.diagnosis.search.problem import Problem, in_lanes
+from sysid.diagnosis.search.problem import LANES, Problem, in_lanes
+from sysid.diagnosis.search.programs import Program, programs
 
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
@@ -38,6 +37,10 @@ meet its limit as soon as a target arrives, has a target for each substep."""
 
 SLOW = 12.0
 """How much longer than that a low-pass with the corner ω at least lasts, 2π / ω."""
+
+FEW_LANES = 16
+"""Number of candidates that are simulated side by side where there are only a few: it
+takes about half as long as `LANES`."""
 
 WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
@@ -69,14 +72,17 @@ def simulated(
     driven = problem.known == "mechanics"
     steps = len(problem.data.track.cmd)
     window = max(round(WINDOW_S / dt), 8) if driven else steps
-    names = _acting(problem.space, thetas)
-    fixed = (dt / substeps, (means, substeps), names, window, driven)
-    parts = []
-    for lanes, count in in_lanes(thetas):
-        params, nuisance = problem.space.values(lanes)
-        angles = _simulated(problem.data.track, params, nuisance, *fixed)
-        parts.append(np.moveaxis(np.asarray(angles, float), 2, 0)[:count])
-    return np.concatenate(parts)
+    fixed = (dt / substeps, (means, substeps), window, driven)
+    out = np.empty((len(thetas), *problem.data.track.cmd.shape))
+    for program, who in programs(problem.space, thetas):
+        first, few = 0, len(who) <= 2 * FEW_LANES
+        for lanes, count in in_lanes(thetas[who], FEW_LANES if few else LANES):
+            params, nuisance = problem.space.values(lanes)
+            angles = _simulated(problem.data.track, params, nuisance, program, *fixed)
+            now = who[first : first + count]
+            out[now] = np.moveaxis(np.asarray(angles, float), 2, 0)[:count]
+            first += count
+    return out
 
 
 def _target_s(problem: Problem) -> float:
@@ -89,20 +95,6 @@ def _target_s(problem: Problem) -> float:
 def _parts(whole_s: float, most_s: float) -> int:
     """Returns how many equal parts are short enough; one per cent may be too long."""
     return max(1, int(np.ceil(whole_s / most_s - 0.01)))
-
-
-def _acting(space: Space, thetas: Float[np.ndarray, "c n"]) -> tuple[str, ...]:
-    """Effects that any candidate has: those at their identity cost time alone.
-
-    Those of the command path are always there: fewer programs are compiled.
-    """
-    away = {
-        slot.effect
-        for i, slot in enumerate(space.slots)
-        if slot.effect and np.any(thetas[:, i] != 0.0)
-        if CATALOGUE[slot.effect].parameters[slot.name].identity is not None
-    }
-    return tuple(n for n in space.effects if n in away or n in command.EFFECTS)
 
 
 @flax.struct.dataclass
@@ -125,22 +117,23 @@ def _simulated(
     track: Track,
     params: dict[str, dict[str, Float[Array, " c"]]],
     nuisance: Nuisance,
+    program: Program,
     dt: float,
     divided: tuple[int, int],
-    names: tuple[str, ...],
     window: int,
     driven: bool,
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side."""
-    effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in names}
-    model = [(KINDS[n], effects[n]) for n in names if n in KINDS]
+    acting = [name for name in program.effects if name in KINDS]
+    effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in acting}
+    model = [(KINDS[n], effects[n]) for n in acting]
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
     steps, pieces = track.pos.shape
     means, substeps = divided
     each = substeps // means
-    targets = _targets(track, params, dt * each, means, count)
+    targets = _targets(track, params, dt * each, means, program.moves)
     cut = _cut(track, targets, window, dt * substeps)
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
@@ -186,14 +179,17 @@ def _simulated(
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
 
 
-def _targets(track: Track, params, dt: float, means: int, count: int):
+def _targets(track: Track, params, dt: float, means: int, moves: bool):
     """Mean commands of a step's equal parts (t, k, p, c), along the sent targets."""
     ends = jnp.arange(1, means + 1)[None, :, None, None]
     sent = means * (track.sent[:, None] + 1.0) - ends
     held = jnp.repeat(track.held[:, None], means, 1)
     held, sent = (x.reshape(-1, *x.shape[2:]) for x in (held, sent))
-    mean = command_path(held, sent, params, dt).mean
-    return mean.reshape(-1, means, track.pos.shape[1], count)
+    if moves:
+        mean = command_path(held, sent, params, dt).mean
+    else:
+        mean = held_command(held, sent, params, dt)
+    return mean.reshape(-1, means, *mean.shape[1:])
 
 
 def _cut(

@@ -35,11 +35,11 @@ LANES = 64
 """Number of candidates that are evaluated at once."""
 
 
-def in_lanes(thetas: np.ndarray) -> Iterator[tuple[np.ndarray, int]]:
-    """Yields batches of `LANES` candidates, the last filled up, and their number."""
-    for first in range(0, len(thetas), LANES):
-        some = thetas[first : first + LANES]
-        filled = np.repeat(some[:1], LANES - len(some), 0)
+def in_lanes(thetas, lanes: int = LANES) -> Iterator[tuple[np.ndarray, int]]:
+    """Yields batches of so many candidates, the last filled up, and their number."""
+    for first in range(0, len(thetas), lanes):
+        some = thetas[first : first + lanes]
+        filled = np.repeat(some[:1], lanes - len(some), 0)
         yield np.concatenate([some, filled]), len(some)
 
 

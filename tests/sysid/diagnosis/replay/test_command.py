@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from sysid.diagnosis.measured.resampling import held_targets
-from sysid.diagnosis.replay.command import command_path
+from sysid.diagnosis.replay.command import command_path, held_command
 
 DT = 0.01
 ROWS = np.arange(400)
@@ -60,3 +60,22 @@ def test_a_limit_that_is_absent_is_none():
         assert none[0][20:] == pytest.approx(path_at(0.4, size * ROWS)[0][20:])
     slow = path_at(0.4, slew_limit={"speed_rad_s": jnp.array([50.0])})[0]
     assert np.diff(slow)[50:] == pytest.approx(0.5, abs=1e-4)
+
+
+@pytest.mark.parametrize("delay_rows", [0.0, 0.4, 2.7])
+def test_without_a_limit_the_mean_needs_no_path(delay_rows):
+    """Rounded, late and of a drifting clock; a limit of speed is not seen."""
+    rng = np.random.default_rng(3)
+    t_s = DT * (ROWS + 0.3 * rng.uniform(size=len(ROWS)))
+    held, sent = held_targets(t_s, rng.normal(size=len(ROWS)), DT * ROWS, 4)
+    params = {
+        "transport_delay": {"delay_s": jnp.array([delay_rows * DT])},
+        "clock_drift": {"drift_ppm": jnp.array([2e3])},
+        "command_quantization": {"step_rad": jnp.array([0.2])},
+    }
+    rows = jnp.array(held[..., None]), jnp.array(sent[..., None])
+    quick = np.asarray(held_command(*rows, params, DT))
+    path = np.asarray(command_path(*rows, params, DT).mean)
+    assert quick == pytest.approx(path, abs=1e-4)
+    slow = params | {"slew_limit": {"speed_rad_s": jnp.array([1.0])}}
+    assert not np.allclose(quick, command_path(*rows, slow, DT).mean, atol=0.1)

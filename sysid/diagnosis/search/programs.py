@@ -1,0 +1,80 @@
+"""Which candidates are simulated side by side, and by which program.
+
+A program is compiled for a set of effects, and every effect in it takes time, acting or
+not. Compiled for each set that comes, programs cost more than what they save; with all
+effects in one, every simulation takes five times as long. So most effects, which cost
+next to nothing, are always there, and a candidate's program is chosen by the others.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from envs.actuator.catalogue import CATALOGUE
+from sysid.diagnosis.search.parameters import Space
+
+COSTLY = (
+    "payload_com",
+    "encoder_eccentricity",
+    "torque_slope_limit",
+    "thermal_derating",
+    "backlash",
+    "compliance",
+    "hysteresis",
+)
+"""Effects that take longer than a tenth of a simulation each."""
+
+PATH = ("lowpass_cutoff", "slew_limit")
+"""Effects with which the command depends on where it was."""
+
+MOST = 2
+"""Number of sets of costly effects that have programs of their own in one call; more
+of them share that of all."""
+
+
+@dataclass(frozen=True)
+class Program:
+    """What is compiled.
+
+    Attributes:
+        effects: those that it simulates, in the order of the chain.
+        moves: whether the command depends on where it was.
+    """
+
+    effects: tuple[str, ...]
+    moves: bool
+
+
+def programs(
+    space: Space, thetas: Float[np.ndarray, "c n"]
+) -> Iterator[tuple[Program, np.ndarray]]:
+    """Yields programs and the candidates that each of them simulates.
+
+    Args:
+        space: coordinates.
+        thetas: coordinates of candidates [1].
+    """
+    names = (*COSTLY, *PATH)
+    acting = np.stack([_acts(space, thetas, name) for name in names], 1)
+    kinds = np.unique(acting, axis=0)
+    costly = [kind for kind in kinds if kind[: len(COSTLY)].any()]
+    if len(costly) > MOST:
+        acting |= acting[:, : len(COSTLY)].any(1, keepdims=True)
+        kinds = np.unique(acting, axis=0)
+    for kind in kinds:
+        some = {name for name, there in zip(names, kind, strict=True) if there}
+        effects = tuple(e for e in space.effects if e not in COSTLY or e in some)
+        who = np.flatnonzero((acting == kind).all(1))
+        yield Program(effects, bool(kind[len(COSTLY) :].any())), who
+
+
+def _acts(space: Space, thetas: np.ndarray, effect: str) -> Bool[np.ndarray, " c"]:
+    """Where an effect changes anything."""
+    known = CATALOGUE[effect].parameters
+    away = np.zeros(len(thetas), bool)
+    for i in space.of(effect):
+        if known[space.slots[i].name].identity is not None:
+            away |= thetas[:, i] != 0.0
+    return away
