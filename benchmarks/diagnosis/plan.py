@@ -103,6 +103,29 @@ def wide_plan(
     return tasks
 
 
+def redrawn(task: Task, again: int) -> Task:
+    """Hides another effect of the same group and magnitude in a record.
+
+    Args:
+        task: whose record does not show what is hidden.
+        again: how often that was so before.
+    """
+    rng = np.random.default_rng([task.seed, 6, again])
+    same = OUTSIDE if task.group == "outside" else CATALOGUE
+    others = [name for name in same if name not in task.effects]
+    company = task.conditions.rig == NEEDS_COMPANY
+    others = [name for name in others if company or name != "joint_coupling"]
+    count = len(task.effects)
+    chosen = rng.choice(_possible(task.conditions, others), count, replace=False)
+    return replace(task, effects=tuple(map(str, chosen)))
+
+
+def _possible(conditions: Conditions, effects: Sequence[str]) -> list[str]:
+    """What can be hidden; a gain that nobody knows is no effect."""
+    gains = () if conditions.gains == "5 %" else ("stiffness", "damping")
+    return [name for name in effects if name not in gains]
+
+
 def _block(seed: int, block: int) -> list[tuple[str, Conditions]]:
     """Groups and conditions of the records of one block."""
     rng = np.random.default_rng([seed, 5, block])
@@ -118,15 +141,14 @@ def _block(seed: int, block: int) -> list[tuple[str, Conditions]]:
 def _hidden(
     rng: np.random.Generator, group: str, conditions: Conditions, effects: Sequence[str]
 ) -> tuple[tuple[str, ...], str]:
-    """What to hide and how strong; a gain that nobody knows is no effect."""
+    """What to hide and how strong."""
     if group == "none":
         return (), "medium"
     if group == "invisible":
         return ("torque_limit",), "invisible"
     if group == "outside":
         return (str(rng.choice(OUTSIDE)),), "medium"
-    gains = () if conditions.gains == "5 %" else ("stiffness", "damping")
-    possible = [name for name in effects if name not in gains]
+    possible = _possible(conditions, effects)
     count = 2 if group == "double" else 1
     chosen = rng.choice(possible, count, replace=False)
     magnitude = "medium" if count == 2 else str(rng.choice(list(RATIOS)))

@@ -24,7 +24,8 @@ from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.problem import LANES, Problem, in_lanes
+from sysid.diagnosis.search.lanes import LANES, in_lanes, lanes_first
+from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.programs import Program, programs
 
 SUBSTEP_S = 0.00025
@@ -73,16 +74,15 @@ def simulated(
     steps = len(problem.data.track.cmd)
     window = max(round(WINDOW_S / dt), 8) if driven else steps
     fixed = (dt / substeps, (means, substeps), window, driven)
-    out = np.empty((len(thetas), *problem.data.track.cmd.shape))
+    parts, order = [], []
     for program, who in programs(problem.space, thetas):
-        first, few = 0, len(who) <= 2 * FEW_LANES
+        few = len(who) <= 2 * FEW_LANES
         for lanes, count in in_lanes(thetas[who], FEW_LANES if few else LANES):
-            params, nuisance = problem.space.values(lanes)
-            angles = _simulated(problem.data.track, params, nuisance, program, *fixed)
-            now = who[first : first + count]
-            out[now] = np.moveaxis(np.asarray(angles, float), 2, 0)[:count]
-            first += count
-    return out
+            values = problem.space.values(lanes)
+            angles = _simulated(problem.data.track, *values, program, *fixed)
+            parts.append(lanes_first(angles, count))
+        order.append(who)
+    return np.concatenate(parts)[np.argsort(np.concatenate(order))]
 
 
 def _target_s(problem: Problem) -> float:

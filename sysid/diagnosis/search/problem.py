@@ -6,7 +6,7 @@ enters; without repeats it is what neighbouring samples do not share (`noise_flo
 and a candidate's residual that is larger counts with its correlation in time.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
@@ -18,6 +18,7 @@ from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.search.folds import folds_of
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
 from sysid.diagnosis.search.repeats import Repeats, repeats_of
@@ -30,17 +31,6 @@ from sysid.diagnosis.search.whitening import (
     with_past,
 )
 from sysid.logs.log import MeasuredLog
-
-LANES = 64
-"""Number of candidates that are evaluated at once."""
-
-
-def in_lanes(thetas, lanes: int = LANES) -> Iterator[tuple[np.ndarray, int]]:
-    """Yields batches of so many candidates, the last filled up, and their number."""
-    for first in range(0, len(thetas), lanes):
-        some = thetas[first : first + lanes]
-        filled = np.repeat(some[:1], lanes - len(some), 0)
-        yield np.concatenate([some, filled]), len(some)
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +78,14 @@ class Problem:
         """
         parts = []
         for lanes, count in in_lanes(thetas):
-            params, nuisance = self.space.values(lanes)
             out = equation_error(
                 self.data.track,
-                params,
-                nuisance,
+                *self.space.values(lanes),
                 np.float32(self.data.friction_speed),
                 self.data.dt,
                 self.space.effects,
             )
-            parts.append(np.moveaxis(np.asarray(out, float), -1, 0)[:count])
+            parts.append(lanes_first(out, count))
         weight = self.weight if weigh else 1.0
         return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
 

@@ -8,7 +8,8 @@ from scipy.signal import lfilter
 
 from sysid.diagnosis.replay.band import EVERY, TAPS
 from sysid.diagnosis.search.candidate import Model, at_nominal, off_prior
-from sysid.diagnosis.search.problem import LANES, Problem
+from sysid.diagnosis.search.lanes import LANES
+from sysid.diagnosis.search.problem import Problem
 
 AROUND = (0.02, 0.002)
 """Logarithms around the best start within which local optima are searched."""

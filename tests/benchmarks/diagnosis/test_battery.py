@@ -2,11 +2,15 @@
 
 from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
 from benchmarks.diagnosis import battery, plan
+from benchmarks.diagnosis.battery import REACHED, _shown
 from benchmarks.diagnosis.factors import by_factor
+from benchmarks.diagnosis.hidden.cases import RATIOS, Case
 from benchmarks.diagnosis.hidden.conditions import LEVELS
 from benchmarks.diagnosis.score import Row, confusion, report, statistics, upper_bound
 
@@ -116,6 +120,42 @@ def test_all_levels_of_a_factor_come_equally_often():
     assert len({t.conditions.clock for t in tasks}) == 100
     gains = {t.conditions.gains for t in tasks if "stiffness" in t.effects}
     assert gains <= {"5 %"}  # a gain that nobody knows is no effect
+
+
+def test_what_a_record_does_not_show_is_drawn_again():
+    """Of the same group and magnitude, each time another; gains only where known."""
+    tasks = plan.wide_plan(5, range(100))
+    for task in (t for t in tasks if t.group in ("single", "double", "outside")):
+        again = [plan.redrawn(task, number) for number in range(6)]
+        assert again == [plan.redrawn(task, number) for number in range(6)]
+        assert len({t.effects for t in again}) > 1
+        for other in again:
+            assert replace(other, effects=task.effects) == task
+            assert not set(other.effects) & set(task.effects)
+            assert len(set(other.effects)) == len(task.effects)
+            outside = [e not in plan.CATALOGUE for e in other.effects]
+            assert all(outside) if task.group == "outside" else not any(outside)
+            known = task.conditions.gains == "5 %"
+            assert known or not {"stiffness", "damping"} & set(other.effects)
+
+
+def test_a_row_that_shows_too_little_or_too_much_is_refused():
+    task = next(
+        t for t in plan.wide_plan(5, range(100))
+        if t.group == "single" and t.magnitude == "medium"
+    )  # fmt: skip
+    low, high = REACHED
+
+    def shown(ratio):
+        log = SimpleNamespace(columns={})
+        stand = SimpleNamespace(mechanism=SimpleNamespace(links=()))
+        case = SimpleNamespace(ratio=ratio, logs=(log,), stand=stand)
+        return _shown(task, cast(Case, case))
+
+    wanted = RATIOS["medium"]
+    shares = (0.9 * low, 1.1 * low, 1.0, 0.9 * high, 1.1 * high)
+    found = [shown(share * wanted) for share in shares]
+    assert found == [False, True, True, True, False]
 
 
 def test_ranges_of_cases():
