@@ -18,11 +18,9 @@ import math
 import multiprocessing
 import os
 import time
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor, as_completed
-from contextlib import ExitStack
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
-from queue import SimpleQueue
 
 import numpy as np
 
@@ -38,6 +36,7 @@ from benchmarks.diagnosis.plan import (
     wide_plan,
 )
 from benchmarks.diagnosis.score import Row, confusion, report, statistics
+from fingers_mjx.studies.sweep.engines.held import CORES, Held, cores
 
 RECORDS_OF_A_PROCESS = 12
 """After so many records a process is replaced: compiled programs take its memory."""
@@ -78,9 +77,9 @@ def _case(task: Task) -> tuple[Task, Case]:
             task = replace(task, conditions=replace(task.conditions, rig="pendulum"))
             case = _drawn(task)
         if _shown(task, case):
-            break
+            return task, case
         task = redrawn(task, again)
-    return task, case
+    raise RuntimeError(f"none of {REDRAWN} effects shows as it should")
 
 
 def _drawn(task: Task) -> Case:
@@ -216,30 +215,10 @@ def numbers(text: str) -> range:
     return range(int(first), int(last or first) + 1)
 
 
-def _one_core(number: int) -> ProcessPoolExecutor:
-    """Makes a process that has a core for itself: XLA's threads would share it."""
-    return ProcessPoolExecutor(
-        1,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_take_core,
-        initargs=(number,),
-        max_tasks_per_child=RECORDS_OF_A_PROCESS,
-    )
-
-
-def _take_core(number: int) -> None:
-    if hasattr(os, "sched_setaffinity"):
-        cores = sorted(os.sched_getaffinity(0))
-        os.sched_setaffinity(0, {cores[number % len(cores)]})
-
-
-def _in_slot(slots: SimpleQueue[ProcessPoolExecutor], task: Task) -> Row:
-    """Runs a task in a process that is free."""
-    slot = slots.get()
-    try:
-        return slot.submit(run_task, task).result()
-    finally:
-        slots.put(slot)
+def _take_core() -> None:
+    """Keeps this process on a core of its own: XLA's threads would share all."""
+    if own := Held(CORES, cores(), 1).names:  # until the process ends
+        os.sched_setaffinity(0, map(int, own))
 
 
 def _run(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
@@ -250,12 +229,14 @@ def _run(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
     done = {row.seed: row for row in map(Row.from_json, lines)}
     missing = [task for task in tasks if task.seed not in done]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    with ExitStack() as stack, open(file, "a") as f:
-        slots = SimpleQueue[ProcessPoolExecutor]()
-        for core in range(workers):
-            slots.put(stack.enter_context(_one_core(core)))
-        threads = stack.enter_context(ThreadPoolExecutor(workers))
-        jobs = {threads.submit(_in_slot, slots, task): task for task in missing}
+    pool = ProcessPoolExecutor(
+        workers,
+        mp_context=multiprocessing.get_context("spawn"),
+        initializer=_take_core,
+        max_tasks_per_child=RECORDS_OF_A_PROCESS,
+    )
+    with pool, open(file, "a") as f:
+        jobs = {pool.submit(run_task, task): task for task in missing}
         for job in as_completed(jobs):
             row = job.result()
             done[row.seed] = row

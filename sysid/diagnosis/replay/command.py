@@ -86,7 +86,7 @@ def command_path(
     def step(carry, row):
         smooth, command = carry
         targets, times = row
-        begin = jnp.clip(times[..., None] + age % 1.0 + 1.0, 0.0, 1.0)
+        begin = _begins(times, age)
         begin = begin.at[0].set(0.0)
         parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
         total, passed = jnp.zeros_like(command), command
@@ -143,7 +143,7 @@ def held_command(
     for i in range(held.shape[1]):
         # The first target has been there before, and the last is to stay.
         last = i == held.shape[1] - 1
-        end = 1.0 if last else jnp.clip(sent[:, i + 1, :, None] + age % 1.0 + 1.0, 0, 1)
+        end = 1.0 if last else _begins(sent[:, i + 1], age)
         mean += (end - begin) * quantized(held[:, i, :, None], grid)
         begin = end
     return _late(mean, _steps_late(params, len(held), dt))
@@ -163,6 +163,11 @@ def _age(params: Params, dt: float) -> Float[Array, " c"]:
     """How old targets are when they act, as readings see it [steps]."""
     delay_s = _value(params, "transport_delay", "delay_s", 0.0)
     return (delay_s + _value(params, "sensor_latency", "latency_s", 0.0)) / dt
+
+
+def _begins(sent: Float[Array, "*s"], age: Float[Array, " c"]) -> Float[Array, "*s c"]:
+    """When within a step targets begin to count, whole steps of their age aside."""
+    return jnp.clip(sent[..., None] + age % 1.0 + 1.0, 0.0, 1.0)
 
 
 def _steps_late(params: Params, count: int, dt: float) -> Float[Array, "t c"]:

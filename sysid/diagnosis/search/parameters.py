@@ -17,6 +17,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import ArrayLike, Float
 
+from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.replay.model import Nuisance
 
 NUISANCE = ""
@@ -53,6 +54,11 @@ class Slot:
     vanishes: bool
     many_optima: bool = False
     released_sd: float = 5.0
+
+    @property
+    def is_size(self) -> bool:
+        """Whether the parameter is a size of its effect, and not only its shape."""
+        return CATALOGUE[self.effect].parameters[self.name].identity is not None
 
     def value(self, u: Float[ArrayLike, "*c"]) -> Float[np.ndarray, "*c"]:
         """Parameter at a coordinate: x = s u, s eᵘ or s / u; see the module.

@@ -12,7 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.search.parameters import Space
 
 COSTLY = (
@@ -72,9 +71,5 @@ def programs(
 
 def _acts(space: Space, thetas: np.ndarray, effect: str) -> Bool[np.ndarray, " c"]:
     """Where an effect changes anything."""
-    known = CATALOGUE[effect].parameters
-    away = np.zeros(len(thetas), bool)
-    for i in space.of(effect):
-        if known[space.slots[i].name].identity is not None:
-            away |= thetas[:, i] != 0.0
-    return away
+    sizes = [i for i in space.of(effect) if space.slots[i].is_size]
+    return np.any(thetas[:, sizes] != 0.0, axis=1)

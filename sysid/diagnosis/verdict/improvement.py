@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.search.candidate import Model
 from sysid.diagnosis.search.judge import within_tolerances
+from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
 from sysid.result import Gain
@@ -24,19 +25,27 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
         units: of `position`, `controller` and `mechanics`.
         seed: of the bootstrap over blocks of time.
     """
-    judge, gains = found.judge, {}
-    models = (within_tolerances(found.problem, found.base), found.best)
-    for k, name in enumerate(found.problem.channels):
-        if found.problem.valid[k].any():
-            before, after = (_heldout(found.problem, m, k) for m in models)
-            valid = found.problem.valid[k]
-            gains[name] = _gain(found.problem, before, after, valid, units[name], seed)
+    judge = found.judge
+    # The error of the angle is the judge's own.
+    angle = isinstance(found.problem, OutputProblem)
+    gains = {} if angle else _equation_gains(found, units, seed)
     if judge.sees:
         pair = (judge.nominal(found.base), judge.moved(found.best))
         before, after = (judge.error(m) for m in pair)
         gains["position"] = _gain(
             found.problem, before, after, judge.valid, units["position"], seed
         )
+    return gains
+
+
+def _equation_gains(found: Search, units: dict[str, str], seed: int) -> dict[str, Gain]:
+    problem, gains = found.problem, {}
+    models = (within_tolerances(problem, found.base), found.best)
+    for k, name in enumerate(problem.channels):
+        if problem.valid[k].any():
+            before, after = (_heldout(problem, m, k) for m in models)
+            parts = (before, after, problem.valid[k], units[name], seed)
+            gains[name] = _gain(problem, *parts)
     return gains
 
 

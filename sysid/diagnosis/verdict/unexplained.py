@@ -18,11 +18,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import settled_output
-from sysid.diagnosis.search.parameters import Slot
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
@@ -122,14 +120,9 @@ def _at_bounds(found: Search) -> list[str]:
         f"{slots[i].label} met its bound"
         for i in fit.bounded
         if slots[i].effect in found.best.effects
-        and _is_size(slots[i])
+        and slots[i].is_size
         and fit.theta[i] != 0.0
     ]
-
-
-def _is_size(slot: Slot) -> bool:
-    """Whether a parameter is a size of its effect, and not only its shape."""
-    return CATALOGUE[slot.effect].parameters[slot.name].identity is not None
 
 
 def _off_prior(found: Search) -> list[str]:
