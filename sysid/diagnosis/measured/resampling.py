@@ -2,6 +2,7 @@
 
 import numpy as np
 from jaxtyping import Float
+from scipy.interpolate import CubicSpline
 
 SMOOTH_STEPS = 0.8
 """Width of the smoothing of all channels [steps of the grid]."""
@@ -11,6 +12,12 @@ AT_ONCE = 1e-4
 
 LONG_AGO = 1e6
 """Age of a target of which nothing is known [steps]."""
+
+LOST = 1.6
+"""Distance of readings above which one is missing between them [periods]."""
+
+BURST = 0.3
+"""Distance of readings below which their difference shows no slope [periods]."""
 
 
 def smoothed(
@@ -44,6 +51,40 @@ def smoothed(
     out = np.fft.irfft(np.fft.rfft(wide - ends) * gain, len(wide))
     out += (ends, slope, 0.0)[order]
     return out[pad : pad + len(x)]
+
+
+def read_between(
+    t_s: Float[np.ndarray, " m"],
+    x: Float[np.ndarray, " m"],
+    grid: Float[np.ndarray, " n"],
+    period_s: float,
+) -> Float[np.ndarray, " n"]:
+    """Readings at the times of a grid, on a cubic spline through their rows.
+
+    On a straight line an angle with the acceleration a that is read h apart errs by up
+    to a h² / 8 between its rows, and a record whose rows jitter has its grid there.
+
+    Args:
+        t_s: times of readings, increasing [s].
+        x: readings, of any unit.
+        grid: times [s]; before the first and after the last reading counts that one.
+        period_s: h [s]. Where a reading is missing a straight line bridges the gap, and
+            of several at almost one time the first counts.
+
+    Returns:
+        Values at the grid, in the unit of the readings.
+
+    Source:
+        Cubic spline interpolation: C. de Boor, A Practical Guide to Splines, 1978.
+    """
+    read = np.interp(grid, t_s, x)
+    apart = np.diff(t_s, prepend=-np.inf)
+    for rows in np.split(np.arange(len(t_s)), np.flatnonzero(apart > LOST * period_s)):
+        knots = rows[apart[rows] > BURST * period_s]
+        if len(knots) > 3:
+            inside = (grid >= t_s[knots[0]]) & (grid <= t_s[knots[-1]])
+            read[inside] = CubicSpline(t_s[knots], x[knots])(grid[inside])
+    return read
 
 
 def held_targets(

@@ -14,8 +14,10 @@ from jaxtyping import Bool, Float
 
 from envs.errors import InputError
 from sysid.diagnosis.measured.resampling import (
+    LOST,
     SMOOTH_STEPS,
     held_targets,
+    read_between,
     shares,
     smoothed,
 )
@@ -197,11 +199,11 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         if key == "cmd":
             held, sent = held_targets(t_s, values, fine[::every], 2 * every + 2)
             speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
-            silences += _unlogged_targets(t_s, values, 1.6 * period, speed)
+            silences += _unlogged_targets(t_s, values, LOST * period, speed)
             silences += _switched_off(log, name, names["pos"])
         else:
-            columns[key] = np.interp(fine, t_s, values)
-            valid &= _near(t_s, fine, 1.6 * period)
+            columns[key] = read_between(t_s, values, fine, period)
+            valid &= _near(t_s, fine, LOST * period)
     resumed = np.zeros(len(fine[::every]), bool)
     for since, back, until in silences:
         valid &= (fine <= since) | (fine >= until)

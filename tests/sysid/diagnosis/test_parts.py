@@ -13,7 +13,12 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
-from sysid.diagnosis.measured.resampling import held_targets, shares, smoothed
+from sysid.diagnosis.measured.resampling import (
+    held_targets,
+    read_between,
+    shares,
+    smoothed,
+)
 from sysid.diagnosis.measured.segments import grid_step_s, pieces_of
 from sysid.diagnosis.replay.command import WITHIN, command_path
 from sysid.diagnosis.replay.link import Link, LinkForce, link_step
@@ -53,6 +58,34 @@ def test_smoothing_keeps_lines_and_derives_waves():
     gain = np.exp(-0.5 * (2.0 * w) ** 2)
     slope = smoothed(np.sin(w * x), 2.0, 1)[100:300]
     assert slope == pytest.approx(gain * w * np.cos(w * x)[100:300], abs=1e-4)
+
+
+def test_rows_that_jitter_are_read_between_on_a_curve():
+    """A straight line errs by a h² / 8 there: 4 mrad at 350 rad/s²."""
+    t_s = 0.01 * np.arange(400) + np.random.default_rng(0).uniform(-1.5e-3, 1.5e-3, 400)
+    grid = 0.01 * np.arange(5, 395)
+    wave, truth = (np.sin(2 * np.pi * 3.0 * t) for t in (t_s, grid))
+    error = np.abs(read_between(t_s, wave, grid, 0.01) - truth).max()
+    assert error < 1e-5 < 2e-3 < np.abs(np.interp(grid, t_s, wave) - truth).max()
+
+
+def test_a_gap_is_bridged_by_a_straight_line():
+    """And bends nothing beside it."""
+    t_s = np.delete(0.01 * np.arange(100), np.arange(40, 60))
+    grid = 0.005 * np.arange(198)
+    read = read_between(t_s, np.sin(20.0 * t_s), grid, 0.01)
+    gap = (grid > 0.391) & (grid < 0.599)
+    line = np.interp(grid, t_s, np.sin(20.0 * t_s))
+    assert read[gap] == pytest.approx(line[gap], abs=1e-12)
+    assert np.abs(read - np.sin(20.0 * grid))[~gap].max() < 1e-4
+
+
+def test_two_readings_at_almost_one_time_throw_no_curve():
+    """A burst of messages: one count of an encoder within a microsecond."""
+    t_s = np.array([0.0, 0.01, 0.02, 0.020001, 0.03, 0.04, 0.05])
+    x = np.array([0.0, 0.0, 0.0, 1e-3, 1e-3, 1e-3, 1e-3])
+    read = read_between(t_s, x, np.linspace(0.0, 0.05, 101), 0.01)
+    assert np.abs(read - 5e-4).max() < 7e-4
 
 
 def test_pieces_end_where_the_clock_jumps():
