@@ -55,6 +55,22 @@ class Alternative:
 
 
 @dataclass(frozen=True)
+class Hypothesis:
+    """What may be behind the records of a joint, and how probable it is.
+
+    Attributes:
+        joint: its name.
+        effects: that the measurement has and the simulation lacks; () for none, null
+            for something that none of the fitted sets explains.
+        probability: calibrated on hidden cases; see docs/reference/diagnosis.md [1].
+    """
+
+    joint: str
+    effects: tuple[str, ...] | None
+    probability: float
+
+
+@dataclass(frozen=True)
 class Gain:
     """Error on data that no fit saw, before and after the causes are added.
 
@@ -90,6 +106,7 @@ class Diagnosis:
         residual_gains: the same for each residual: `position`, `controller`,
             `mechanics`.
         next_experiment: what to record next, in one sentence; "" if nothing is needed.
+        posterior: hypotheses about each joint that are not improbable; a walk has none.
         not_observable: effects that these records could not show at a size that
             matters.
         unexplained: where an error remains that no effect explains.
@@ -109,6 +126,7 @@ class Diagnosis:
     seed: int
     runtime_s: float
     residual_gains: dict[str, Gain] = field(default_factory=dict)
+    posterior: tuple[Hypothesis, ...] = ()
     not_observable: tuple[str, ...] = ()
     unexplained: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

@@ -20,6 +20,7 @@ from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Examined
+from sysid.diagnosis.verdict.wording import probable
 from sysid.result import Diagnosis
 
 SHOWN_S = 12.0
@@ -92,6 +93,9 @@ def _verdict(diagnosis: Diagnosis) -> list:
         header = ("cause", "where", "parameter", "value", "95 % low", "95 % high",
                   "unit", "log-likelihood gain")  # fmt: skip
         blocks.append(Table(header, rows, "Causes in order of gain."))
+    if said := probable(diagnosis.posterior):
+        caption = "Of the joints that may have an effect; calibrated on hidden cases."
+        blocks.append(Table(("joint", "hypothesis", "probability"), said, caption))
     if diagnosis.residual_gains:
         rows = [
             (n, g.heldout_rmse_before, g.heldout_rmse_after, g.noise_floor,

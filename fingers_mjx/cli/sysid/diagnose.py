@@ -111,12 +111,15 @@ def _write(out: Path, diagnosis: Diagnosis, hand: HandFile | None) -> int:
     """Writes and prints the verdict, and the hand with the effects in it."""
     from envs.hand.hand_file import save_hand_file
     from sysid.diagnosis.verdict.hand import extended_hand
+    from sysid.diagnosis.verdict.wording import probable
 
     out.mkdir(parents=True, exist_ok=True)
     write_atomic(out / "diagnosis.json", diagnosis.to_json() + "\n")
     if hand is not None and diagnosis.causes:
         save_hand_file(extended_hand(hand, diagnosis), out / "hand.yaml")
     print(f"{diagnosis.verdict}: {diagnosis.summary}")
+    for joint, words, probability in probable(diagnosis.posterior):
+        print(f"  {joint}: {words}, {probability:.0%}")
     if diagnosis.next_experiment:
         print(diagnosis.next_experiment)
     return 0

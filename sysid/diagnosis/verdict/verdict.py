@@ -8,10 +8,18 @@ from sysid.diagnosis.verdict.alternatives import alternatives_of
 from sysid.diagnosis.verdict.causes import causes_of, evidence
 from sysid.diagnosis.verdict.improvement import residual_gains
 from sysid.diagnosis.verdict.observability import common_blind_effects
+from sysid.diagnosis.verdict.posterior import hypotheses_of
 from sysid.diagnosis.verdict.unexplained import unexplained_signs
 from sysid.diagnosis.verdict.wording import next_experiment, summary_of, warnings_of
 from sysid.mechanism import Mechanism
-from sysid.result import Alternative, Cause, Diagnosis, Gain, Verdict
+from sysid.result import (
+    Alternative,
+    Cause,
+    Diagnosis,
+    Gain,
+    Hypothesis,
+    Verdict,
+)
 
 BLIND_SHARE = 0.6
 """Share of the effects that records must hide to be called not observable."""
@@ -36,18 +44,27 @@ def verdict_of(
     causes = causes_of(searched, mechanism)
     warnings += [w for e in searched for w in warnings_of(e.found)]
     blind = common_blind_effects(searched)
-    signs = tuple(text for e in searched for text in unexplained_signs(e.found))
+    signs = {e.track.joint: unexplained_signs(e.found) for e in searched}
     first = _leading(searched, causes)
-    alternatives = alternatives_of(first.found) if causes else ()
+    same = {e.track.joint: _alternatives(e) for e in searched}
+    alternatives = same[first.track.joint]
     hidden = len(blind) > BLIND_SHARE * len(searched[0].found.problem.space.effects)
+    posterior = [
+        h
+        for e in searched
+        for j in [e.track.joint]
+        for h in hypotheses_of(e.found, same[j], bool(signs[j]))
+    ]
+    texts = tuple(text for some in signs.values() for text in some)
     return _diagnosis(
-        _word(causes, alternatives, signs, hidden),
+        _word(causes, alternatives, texts, hidden),
         seed,
         causes=tuple(causes),
         alternatives=alternatives,
         residual_gains=gains[first.track.joint],
+        posterior=tuple(posterior),
         blind=blind,
-        signs=signs,
+        signs=texts,
         warnings=warnings,
     )
 
@@ -59,6 +76,7 @@ def _diagnosis(
     causes: tuple[Cause, ...] = (),
     alternatives: tuple[Alternative, ...] = (),
     residual_gains: dict[str, Gain] | None = None,
+    posterior: tuple[Hypothesis, ...] = (),
     blind: tuple[str, ...] = (),
     signs: tuple[str, ...] = (),
     warnings: Sequence[str] = (),
@@ -75,11 +93,17 @@ def _diagnosis(
         seed=seed,
         runtime_s=0.0,
         residual_gains=residual_gains or {},
+        posterior=posterior,
         not_observable=blind,
         unexplained=signs,
         warnings=tuple(warnings),
         summary=summary_of(verdict, causes, alternatives, gain, blind, signs),
     )
+
+
+def _alternatives(examined: Examined) -> tuple[Alternative, ...]:
+    found = examined.found
+    return alternatives_of(found) if found.best.effects else ()
 
 
 def _gains_of(examined: Examined, mechanism: Mechanism, seed: int) -> dict[str, Gain]:

@@ -6,7 +6,13 @@ import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
 from sysid.diagnosis.search.search import Search
-from sysid.result import Alternative, Cause, Gain, Verdict
+from sysid.result import Alternative, Cause, Gain, Hypothesis, Verdict
+
+SURE = 0.9
+"""Probability of no effect above which a joint is not spoken of."""
+
+SPOKEN = 3
+"""Number of hypotheses about a joint that are spoken of."""
 
 
 def warnings_of(found: Search) -> list[str]:
@@ -91,6 +97,33 @@ def summary_of(
     if verdict == "ambiguous":
         return f"The simulation lacks {names}, or {_instead(alternatives)}.{share}"
     return f"The simulation lacks {names}.{share}"
+
+
+def probable(posterior: Sequence[Hypothesis]) -> list[tuple[str, str, float]]:
+    """Says what is probable of the joints that may have an effect.
+
+    Args:
+        posterior: hypotheses, the most probable of each joint first.
+
+    Returns:
+        Joint, hypothesis in words and its probability.
+    """
+    joints: dict[str, list[Hypothesis]] = {}
+    for h in posterior:
+        joints.setdefault(h.joint, []).append(h)
+    return [
+        (joint, _named(h.effects), h.probability)
+        for joint, said in joints.items()
+        if said[0].effects != () or said[0].probability < SURE
+        for h in said[:SPOKEN]
+    ]
+
+
+def _named(effects: tuple[str, ...] | None) -> str:
+    """Names a set of effects."""
+    if effects is None:
+        return "none of these"
+    return " and ".join(effects) or "no effect"
 
 
 def _instead(alternatives: Sequence[Alternative]) -> str:

@@ -1,0 +1,134 @@
+"""How probable each set of causes of a joint is: a calibrated posterior.
+
+The likelihoods of simulations that are not exact are too sure of themselves: with a
+large gain grows what its model errs by. So logarithms of likelihoods are tempered, the
+more the larger the largest of them is, and how much is measured, on hidden cases of
+which the truth is known (`benchmarks.diagnosis.calibration`).
+"""
+
+import math
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.verdict.evidence import evidence
+from sysid.result import Alternative, Hypothesis
+
+Effects = tuple[str, ...]
+"""A set of effects, sorted; () for none."""
+
+LEAST = 0.01
+"""Probability below which a hypothesis is not reported."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Constants of the posterior, natural logarithms.
+
+    Attributes:
+        temper: λ, weight of a small gain.
+        model_error: κ, by which the weight falls with the largest gain.
+        effect_cost: c, prior odds against each effect.
+        named: δ, what a set gains that the verdict names.
+        left, clean: odds of none of these where something remains unexplained, and
+            where nothing does.
+    """
+
+    temper: float
+    model_error: float
+    effect_cost: float
+    named: float
+    left: float
+    clean: float
+
+
+CALIBRATION = Calibration(0.21, 0.054, 3.6, 2.5, 0.4, -4.7)
+"""Fitted by `benchmarks.diagnosis.calibration` to 124 joints of battery seed 6007."""
+
+
+def posterior(
+    log_likelihoods: Mapping[Effects, float],
+    named: Collection[Effects],
+    left: bool,
+    by: Calibration = CALIBRATION,
+) -> dict[Effects | None, float]:
+    """Probabilities of sets of effects S, and of none of them.
+
+        P(S) = (1 − P₀) w(S) / Σ w,   log w(S) = λ g / (1 + κ G) − c |S| + δ [S named]
+        P₀ = 1 / (1 + e^{−o})
+
+    with g = ℓ(S) − ℓ(∅) and its largest value G.
+
+    Args:
+        log_likelihoods: ℓ on stretches that no fit saw, of every set that was fitted.
+        named: the chosen set, and those that the records do not distinguish from it.
+        left: whether something remains that none of them explains.
+        by: the constants.
+
+    Returns:
+        Probabilities that add up to 1 [1]; that of none of these under None.
+
+    Source:
+        Tempered posterior: P. Grünwald and T. van Ommen, Inconsistency of Bayesian
+        Inference for Misspecified Linear Models, and a Proposal for Repairing It,
+        Bayesian Analysis 12(4), 2017; calibration of a score on held-out cases: J.
+        Platt, Probabilistic Outputs for Support Vector Machines, 1999.
+
+    Examples:
+        >>> found = posterior({(): -40.0, ("deadband",): 0.0}, [("deadband",)], False)
+        >>> max(found, key=found.get)
+        ('deadband',)
+    """
+    sets = list(log_likelihoods)
+    gain = np.array(list(log_likelihoods.values())) - log_likelihoods[()]
+    weight = by.temper * gain / (1.0 + by.model_error * max(gain.max(), 0.0))
+    weight -= by.effect_cost * np.array([len(s) for s in sets])
+    extra = by.named * np.array([s in named for s in sets])
+    weight = np.exp(weight + extra - np.max(weight + extra))
+    none_of_these = 1.0 / (1.0 + math.exp(-(by.left if left else by.clean)))
+    share = (1.0 - none_of_these) * weight / weight.sum()
+    return {**dict(zip(sets, share.tolist(), strict=True)), None: none_of_these}
+
+
+def named_sets(
+    chosen: Collection[str], alternatives: Collection[tuple[str, str]]
+) -> set[Effects]:
+    """The sets that a verdict names: S*, and S* with a cause exchanged.
+
+    Args:
+        chosen: the effects of S*.
+        alternatives: pairs of an effect and the cause in whose place it may be.
+
+    Source:
+        Ours.
+
+    Examples:
+        >>> sorted(named_sets(["deadband"], [("backlash", "deadband")]))
+        [('backlash',), ('deadband',)]
+    """
+    named = {tuple(sorted(chosen))}
+    for effect, cause in alternatives:
+        named.add(tuple(sorted({effect, *chosen} - {cause})))
+    return named
+
+
+def hypotheses_of(
+    found: Search, alternatives: Collection[Alternative], left: bool
+) -> tuple[Hypothesis, ...]:
+    """The hypotheses about one joint that are not improbable, most probable first.
+
+    Args:
+        found: its search.
+        alternatives: effects that could stand in the place of its causes.
+        left: whether something remains that its causes do not explain.
+
+    Source:
+        `posterior` of `evidence`.
+    """
+    same = [(a.effect, a.cause) for a in alternatives if not a.distinguishable]
+    said = posterior(evidence(found), named_sets(found.best.effects, same), left)
+    ranked = sorted(said.items(), key=lambda item: -item[1])
+    joint = found.problem.data.joint
+    return tuple(Hypothesis(joint, s, p) for s, p in ranked if p >= LEAST)
