@@ -79,20 +79,19 @@ def log_score(by: Calibration, cases: Sequence[Case]) -> float:
 
 
 def fitted(cases: Sequence[Case]) -> Calibration:
-    """The constants of the largest log score, from three starts."""
+    """The constants of the largest log score, from two starts."""
 
     def loss(x: np.ndarray) -> float:
         return -log_score(_constants(x), cases)
 
-    starts = [(0.3, 0.003), (0.1, 0.03), (0.5, 0.1)]
-    x0 = [np.array([*np.log(s), 4.0, 2.0, 0.0, -4.0]) for s in starts]
+    x0 = [np.array([np.log(weight), 4.0, 2.0, 0.0, -4.0]) for weight in (0.5, 2.0)]
     options = {"maxiter": 4000, "xatol": 1e-3, "fatol": 1e-6}
     found = [minimize(loss, x, method="Nelder-Mead", options=options) for x in x0]
     return _constants(min(found, key=lambda f: f.fun).x)
 
 
 def _constants(x: np.ndarray) -> Calibration:
-    return Calibration(*np.exp(x[:2]).tolist(), *x[2:].tolist())
+    return Calibration(float(np.exp(x[0])), *x[1:].tolist())
 
 
 def leading(by: Calibration, cases: Sequence[Case]) -> tuple[np.ndarray, np.ndarray]:

@@ -2,7 +2,7 @@
 
 The likelihoods of simulations that are not exact are too sure of themselves: with a
 large gain grows what its model errs by. So logarithms of likelihoods are tempered, the
-more the larger the largest of them is, and how much is measured, on hidden cases of
+more the larger they are, and how much is measured, on hidden cases of
 which the truth is known (`benchmarks.diagnosis.calibration`).
 """
 
@@ -22,14 +22,16 @@ Effects = tuple[str, ...]
 LEAST = 0.01
 """Probability below which a hypothesis is not reported."""
 
+LEAST_GAIN = 1e-6
+"""Largest gain that is none."""
+
 
 @dataclass(frozen=True)
 class Calibration:
     """Constants of the posterior, natural logarithms.
 
     Attributes:
-        temper: λ, weight of a small gain.
-        model_error: κ, by which the weight falls with the largest gain.
+        temper: λ, weight of the share that a set explains.
         effect_cost: c, prior odds against each effect.
         named: δ, what a set gains that the verdict names.
         left, clean: odds of none of these where something remains unexplained, and
@@ -37,14 +39,13 @@ class Calibration:
     """
 
     temper: float
-    model_error: float
     effect_cost: float
     named: float
     left: float
     clean: float
 
 
-CALIBRATION = Calibration(0.21, 0.054, 3.6, 2.5, 0.4, -4.7)
+CALIBRATION = Calibration(0.58, 3.52, 2.5, 0.41, -4.67)
 """Fitted by `benchmarks.diagnosis.calibration` to 124 joints of battery seed 6007."""
 
 
@@ -56,10 +57,11 @@ def posterior(
 ) -> dict[Effects | None, float]:
     """Probabilities of sets of effects S, and of none of them.
 
-        P(S) = (1 − P₀) w(S) / Σ w,   log w(S) = λ g / (1 + κ G) − c |S| + δ [S named]
-        P₀ = 1 / (1 + e^{−o})
+        P(S) = (1 − P₀) w(S) / Σ w,   P₀ = 1 / (1 + e^{−o})
+        log w(S) = λ (g / G) ln(1 + G) − c |S| + δ [S named]
 
-    with g = ℓ(S) − ℓ(∅) and its largest value G.
+    with the gain g = ℓ(S) − ℓ(∅) and its largest value G > 0: shares of what can be
+    explained decide, and the more of it there is the less by its amount.
 
     Args:
         log_likelihoods: ℓ on stretches that no fit saw, of every set that was fitted.
@@ -83,7 +85,8 @@ def posterior(
     """
     sets = list(log_likelihoods)
     gain = np.array(list(log_likelihoods.values())) - log_likelihoods[()]
-    weight = by.temper * gain / (1.0 + by.model_error * max(gain.max(), 0.0))
+    most = max(float(gain.max()), LEAST_GAIN)
+    weight = by.temper * gain / most * math.log1p(most)
     weight -= by.effect_cost * np.array([len(s) for s in sets])
     extra = by.named * np.array([s in named for s in sets])
     weight = np.exp(weight + extra - np.max(weight + extra))

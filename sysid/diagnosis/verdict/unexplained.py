@@ -19,21 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
+from sysid.diagnosis.search.judge import LEFT, REMAINING
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import settled_output
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
-
-REMAINING = 0.2
-"""Share of the removable squared error that may remain of a complete explanation: its
-equation is right to half of its trace. Of a friction that falls with speed 0.17 remains
-about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
-
-LEFT = 2.0
-"""Mean squared error that may remain, in units of its noise: of the angle it is at most
-1.6 of 26 joints without effects, and at least 2.2 of those with one that is not in the
-catalogue (hidden mechanisms of two seeds)."""
 
 OUTLIER_SD = 8.0
 """Standard deviations of the noise that no sample of it reaches."""

@@ -17,7 +17,7 @@ from benchmarks.diagnosis.score import Row
 from sysid.diagnosis.verdict.posterior import CALIBRATION, posterior
 
 EFFECTS = ("armature", "backlash", "deadband")
-SURER = dataclasses.replace(CALIBRATION, temper=1.0, model_error=0.0, effect_cost=0.0)
+SURER = dataclasses.replace(CALIBRATION, temper=3.0)
 
 
 def drawn(count: int, seed: int) -> list[Case]:

@@ -1,10 +1,8 @@
 """Probabilities of sets of causes, from likelihoods that are written down here."""
 
-import dataclasses
-
 import pytest
 
-from sysid.diagnosis.verdict.posterior import CALIBRATION, named_sets, posterior
+from sysid.diagnosis.verdict.posterior import named_sets, posterior
 from sysid.diagnosis.verdict.wording import probable
 from sysid.result import Hypothesis
 
@@ -18,7 +16,7 @@ def test_probabilities_add_up_to_one():
 
 def test_what_the_verdict_names_is_probable():
     said = posterior(FOUND, NAMED, False)
-    assert said["deadband",] > 0.8 > 0.1 > said["backlash",] > said[()]
+    assert said["deadband",] > 0.7 > 0.3 > said[()]
 
 
 def test_a_tie_is_shared():
@@ -41,12 +39,10 @@ def test_what_remains_speaks_for_none_of_these():
 
 
 def test_large_gains_are_tempered():
-    """A hundredth of what is explained decides less than a likelihood would."""
-    rivals = {(): -3000.0, ("backlash",): -30.0, ("deadband",): 0.0}
-    bare = dataclasses.replace(CALIBRATION, named=0.0)
-    exact = dataclasses.replace(bare, temper=1.0, model_error=0.0)
-    assert posterior(rivals, [], False, bare)["backlash",] > 0.3
-    assert posterior(rivals, [], False, exact)["backlash",] < 1e-9
+    """A hundredth of what is explained decides little, all of it much."""
+    even = {(): -3000.0, ("backlash",): -30.0, ("deadband",): 0.0}
+    said = posterior(even, [], False)
+    assert said["backlash",] > 0.3 > 0.2 > said[()]
 
 
 def test_only_joints_that_may_have_an_effect_are_spoken_of():

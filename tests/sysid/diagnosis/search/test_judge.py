@@ -1,0 +1,72 @@
+"""When the judge believes a cause, with simulations that are written down here."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid.diagnosis.search import judge as module
+from sysid.diagnosis.search.judge import LEVEL, Judge
+from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
+
+ENOUGH = 2.0 * NOMINAL_THRESHOLD
+
+
+class Said(Judge):
+    """A judge whose simulations gain so much, and differ so clearly."""
+
+    def __init__(self, gain, t, repeat=True, effort=True):
+        data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
+        super().__init__(SimpleNamespace(data=data, known="both", repeat=repeat), None)
+        self.gain, self.t = gain, t
+        self.output = SimpleNamespace(samples=4)
+
+    def moved(self, model):
+        return model
+
+    nominal = moved
+
+    def t_value(self, worse, better):
+        return self.t
+
+
+@pytest.fixture(autouse=True)
+def _gains(monkeypatch):
+    monkeypatch.setattr(module, "log_likelihood_gain", lambda *models: models[1].gain)
+
+
+def says(judge, before=1.0, after=1.0):
+    """Its verdict on models that leave so much of the equations' errors."""
+    models = [SimpleNamespace(errors=np.array([1.0, x])) for x in (before, after)]
+    models[1].gain = judge.gain
+    return judge.confirms(*models)
+
+
+def test_an_angle_that_is_predicted_better_confirms():
+    assert says(Said(ENOUGH, 2.0 * LEVEL))
+
+
+def test_what_the_angle_does_not_need_is_no_cause():
+    assert not says(Said(0.0, 2.0 * LEVEL))
+
+
+def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
+    """Friction that a servo's damping hides: 381 times the noise becomes none."""
+    assert says(Said(1.4, 7.4), before=381.0, after=0.5)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"t": 0.5 * LEVEL},
+        {"repeat": False},
+        {"effort": False},
+        {"after": 100.0},
+        {"before": 1.8},
+    ],
+)
+def test_it_does_not_count_otherwise(changed):
+    """The angle comes no nearer, the noise is not known, or much remains."""
+    left = {"before": 381.0, "after": 0.5, **changed}
+    sizes = {k: left.pop(k) for k in ("before", "after")}
+    assert not says(Said(**{"gain": 1.4, "t": 7.4, **left}), **sizes)
