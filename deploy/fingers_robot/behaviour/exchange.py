@@ -26,6 +26,8 @@ class Query:
         runs: the policy's targets pass; else it starts afresh at `target_rad`.
         policy: number of the policy that the operator has selected.
         key: one more than the place of a key that the operator asks for now; 0: none.
+        turned_rad: sum of the turns that the operator has asked for [rad], so that one
+            is not lost with a query.
         challenge: number whose complement renews the lease.
     """
 
@@ -38,6 +40,7 @@ class Query:
     runs: bool
     policy: int = 0
     key: int = 0
+    turned_rad: float = 0.0
     challenge: int = 0
 
 

@@ -1,11 +1,16 @@
 """Heading hold: yaw-rate command from the IMU's heading."""
 
 import math
+import re
 from dataclasses import dataclass
 
 from fingers_deploy.rotations import Vector
 
 _TURNING = 0.02  # a commanded rate above this steers, below it the heading is held
+_DEGREES = re.compile(r"[+-]?[0-9]{1,3}(\.[0-9]{1,3})?", re.ASCII)
+MOST_DEG = 180.0
+"""Largest turn that an operator may ask for at once: beyond it the way round is shorter
+[deg]."""
 
 
 @dataclass(frozen=True)
@@ -49,6 +54,13 @@ def heading_step(
         return heading_rad, min(max(rate, c.low), c.high)
     rate = c.gain * wrap(reference_rad - heading_rad) + c.offset_rad_s
     return reference_rad, min(max(rate, c.low), c.high)
+
+
+def turn_of(text: str) -> float | None:
+    """Returns a turn that was typed in degrees [rad]; None if it is none."""
+    if not _DEGREES.fullmatch(text) or abs(float(text)) > MOST_DEG:
+        return None
+    return math.radians(float(text))
 
 
 def heading(quat_w: Vector) -> float:

@@ -16,7 +16,12 @@ from fingers_robot.behaviour.command import (
     rest_command,
 )
 from fingers_robot.behaviour.exchange import Query
-from fingers_robot.behaviour.heading import HeadingConfig, heading, heading_step
+from fingers_robot.behaviour.heading import (
+    HeadingConfig,
+    heading,
+    heading_step,
+    wrap,
+)
 from fingers_robot.behaviour.keyboard.runner import KeyRunner
 from fingers_robot.behaviour.task_inputs import OBJECT_TERMS, Given, reads, resized
 from fingers_robot.behaviour.tracker_port import TrackerPort
@@ -61,6 +66,7 @@ class Sources:
         self.command, self._hold = command, heading_hold
         self.keys, self.tracker = keys or KeyRunner(), tracker
         self._reference: float | None = None
+        self._turned_rad = 0.0
         self._state = CommandState(np.zeros(0), 0.0)
 
     def rest(self) -> None:
@@ -133,6 +139,8 @@ class Sources:
             self._state = CommandState(rest, self._state.t_s)
         self._state, _ = command_step(self._state, frame, t, ranges)
         command = self._state.value.astype(np.float32)
+        turn = query.turned_rad - self._turned_rad
+        self._turned_rad = query.turned_rad
         if self._hold is None or len(ranges) != _YAW + 1:
             return command
         quat = query.quat_w
@@ -141,6 +149,9 @@ class Sources:
             self._reference = None
             return command
         yaw = heading(multiply(quat, interface.v_quat_b))
+        if turn:
+            held_rad = yaw if self._reference is None else self._reference
+            self._reference = wrap(held_rad + turn)
         self._reference, rate = heading_step(
             self._reference, yaw, float(command[_YAW]), self._hold
         )

@@ -43,7 +43,8 @@ def drive(
         The exit status.
     """
     launcher = Launcher(options, speaker)
-    typed = Typed(len(options["bundles"]), launcher.send)
+    holds = bool(options["heading_hold"])
+    typed = Typed(len(options["bundles"]), launcher.send, holds)
     console = Console(launcher, typed, speaker, arm, duration_s)
     if not unattended:
         console.attend(lambda: not typed.closed, lambda: speaker.read)

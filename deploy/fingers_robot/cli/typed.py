@@ -27,10 +27,11 @@ class Typed:
     Args:
         policies: how many policies the run has.
         send: takes words for the supervisor, from either thread.
+        holds: whether it holds the heading.
     """
 
-    def __init__(self, policies: int, send: Callable[[str], None]):
-        self._policies, self._send = policies, send
+    def __init__(self, policies: int, send: Callable[[str], None], holds: bool = False):
+        self._policies, self._send, self._holds = policies, send, holds
         self.closed = False
         """Nothing more can be typed."""
         self.stopped = False
@@ -94,7 +95,7 @@ class Typed:
             return f"{self._refusal}{more}" if count else ""
 
     def _take(self, line: bytes) -> None:
-        word = parse(line[:_LONGEST], self._policies)
+        word = parse(line[:_LONGEST], self._policies, self._holds)
         with self._lock:
             if isinstance(word, str):
                 self._refused, self._refusal = self._refused + 1, word

@@ -6,6 +6,7 @@ import socket
 from collections import deque
 from typing import Any
 
+from fingers_robot.behaviour.heading import turn_of
 from fingers_robot.behaviour.keyboard.keys import ARROWS
 from fingers_robot.safety.types import Operator
 from fingers_robot.waiting import waiting
@@ -42,6 +43,7 @@ class ConsoleLink:
         self.quitting = False
         self.selected: int | None = None
         self.keys: deque[int] = deque(maxlen=_MAX_KEYS)
+        self.turned_rad = 0.0
         self._last_s = math.inf
 
     def poll(self, t: float) -> Operator:
@@ -64,6 +66,8 @@ class ConsoleLink:
                 self.quitting, action = True, _severer(action, Operator.STOP)
             elif word.startswith("key ") and word[4:] in ARROWS:
                 self.keys.append(ARROWS.index(word[4:]))
+            elif word.startswith("turn "):
+                self.turned_rad += turn_of(word[5:]) or 0.0
             elif word in ACTIONS:
                 action = _severer(action, ACTIONS[word])
             else:

@@ -92,6 +92,8 @@ class Core:
         self.selected = 0
         self.keys: deque[int] = deque()
         """That the operator asks for, the next one first."""
+        self.turned_rad = 0.0
+        """Sum of the turns that he has asked for."""
         self._write_error = ""
         self._sent: dict[int, float] = {}
         self._row = empty_row()
@@ -209,6 +211,7 @@ class Core:
             runs=out.policy_runs,
             policy=self.selected,
             key=self.keys.popleft() + 1 if self.keys else 0,
+            turned_rad=self.turned_rad,
             challenge=out.challenge,
         )
         self._sent = {control: t}

@@ -24,6 +24,7 @@ QUERY = np.dtype(
         ("runs", "?"),
         ("policy", "<i4"),
         ("key", "<i4"),
+        ("turned_rad", "<f8"),
     ]
 )
 """Supervisor to policy: the fields of `Query`."""

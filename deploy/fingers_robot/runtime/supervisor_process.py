@@ -153,6 +153,7 @@ class Supervisor:
         if self._console.selected is not None:
             self._core.selected = self._console.selected
         self._core.keys = self._console.keys
+        self._core.turned_rad = self._console.turned_rad
         if operator == Operator.ARM and not (self._guard.ready and self._guard.there):
             return Operator.NONE, ("arm refused: no guard watches",)
         gone = self._console.quitting or not self._guard.there

@@ -87,7 +87,7 @@ class Run:
         self.pos, self.k = self.target.copy(), 0
         self.quat, self.moved = conjugate(self.interface.v_quat_b), 0.0
 
-    def step(self, policy=0, runs=True, key=0):
+    def step(self, policy=0, runs=True, key=0, turned_rad=0.0):
         query = Query(
             tick=self.k,
             t_s=50.0 + 0.02 * self.k,
@@ -98,6 +98,7 @@ class Run:
             runs=runs,
             policy=policy,
             key=key,
+            turned_rad=turned_rad,
         )
         answer = self.policies.answer(query)
         self.k += 1
@@ -296,6 +297,26 @@ def test_heading_hold_turns_only_while_the_dead_man_is_held(bundles, held):
     # What it turned meanwhile is not turned back afterwards.
     run.operator.held = True
     assert run.step().command[2] == pytest.approx(rate, abs=1e-5)
+
+
+def test_a_turn_changes_the_heading_that_is_held(bundles):
+    hold = HeadingConfig(1.0, 0.0, -0.45, 0.45)
+    run = Run(bundles, "crawl", heading_hold=hold, operator=Operator((0.0, 0.0, 0.0)))
+    run.step()
+    assert run.step(turned_rad=0.2).command[2] == pytest.approx(0.2, abs=1e-5)
+    # The sum of the turns stays: it is not turned once more.
+    assert run.step(turned_rad=0.2).command[2] == pytest.approx(0.2, abs=1e-5)
+    assert run.step(turned_rad=0.1).command[2] == pytest.approx(0.1, abs=1e-5)
+
+
+def test_a_turn_while_nobody_holds_the_button_is_forgotten(bundles):
+    hold = HeadingConfig(1.0, 0.0, -0.45, 0.45)
+    run = Run(bundles, "crawl", heading_hold=hold, operator=Operator((0.0, 0.0, 0.0)))
+    run.operator.held = False
+    run.step()
+    assert run.step(turned_rad=0.2).command[2] == 0.0
+    run.operator.held = True
+    assert run.step(turned_rad=0.2).command[2] == pytest.approx(0.0, abs=1e-5)
 
 
 def test_heading_hold_stays_within_what_the_policy_knows(bundles):

@@ -39,5 +39,20 @@ def test_anything_else_is_answered_by_what_may_be_typed(line):
     assert len(said) < 200 and said.isprintable()
 
 
+@pytest.mark.parametrize("degrees", ["30", "-15", "+7.5", "180"])
+def test_a_turn_is_sent_where_a_heading_is_held(degrees):
+    line = f"turn {degrees}".encode()
+    assert parse(line, 1, holds=True) == Word("turn", (f"turn {degrees}",))
+    assert parse(line, 1) == "found turn; valid with --heading-hold GAIN OFFSET"
+
+
+@pytest.mark.parametrize(
+    "degrees", ["181", "nan", "inf", "1e2", "x", "١", "--3", "9999"]
+)
+def test_a_turn_that_is_none_is_refused_with_what_is_valid(degrees):
+    said = parse(f"turn {degrees}".encode(), 1, holds=True)
+    assert isinstance(said, str) and said.endswith("to the left positive")
+
+
 def test_keys_go_one_by_one():
     assert parse(b"keys left up", 1) == Word("keys", ("key left", "key up"))

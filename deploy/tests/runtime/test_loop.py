@@ -33,6 +33,7 @@ QUERY = Query(
     runs=True,
     policy=1,
     key=3,
+    turned_rad=-0.25,
     challenge=2**63 + 5,
 )
 
@@ -238,6 +239,7 @@ def test_off_is_more_than_stop(words):
     [
         *("policy 2", "policy 2147483648", "policy -1", "policy ²", "policy"),
         *("policy 1_0", "key", "key x", "\x00", "policy " + "9" * 60_000),
+        *("turn", "turn x", "turn nan", "turn 1e2", "turn 181", "turn 1 2"),
     ],
 )
 def test_words_that_no_console_sends_change_nothing(word):
@@ -246,6 +248,16 @@ def test_words_that_no_console_sends_change_nothing(word):
     right.send(word.encode())
     assert console.poll(0.0) == Operator.NONE
     assert console.selected is None and not console.keys
+    assert console.turned_rad == 0.0
+
+
+def test_turns_add_up():
+    left, right = make_link()
+    console = ConsoleLink(left)
+    for word in ("turn 30", "turn -7.5", "turn 90"):
+        right.send(word.encode())
+    console.poll(0.0)
+    assert console.turned_rad == pytest.approx(np.radians(112.5))
 
 
 def test_a_console_that_falls_silent_is_gone():
