@@ -85,7 +85,12 @@ def model_with(error, gained=0.0):
     score = 2000.0 - 2.0 * gained
     fit = SimpleNamespace(cost=score)
     return SimpleNamespace(
-        error=error, score=score, fit=fit, noise_cost=0.0, variance=lambda samples: 1.0
+        error=error,
+        score=score,
+        fit=fit,
+        noise_cost=0.0,
+        variance=lambda samples: 1.0,
+        errors=np.ones(2),
     )
 
 
