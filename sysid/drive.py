@@ -10,6 +10,7 @@ from envs.errors import InputError, one_of
 
 SCHEMA = 1
 Effort = Literal["tau", "cur", "duty", "none"]
+Part = Literal["both", "controller", "mechanics"]
 UNIVERSAL = ("1", "s", "Hz", "1e-6")
 """Units of parameters whose bounds hold for a robot of any size."""
 
@@ -52,7 +53,7 @@ class JointDrive:
     effort: Effort = "tau"
     effort_scale: Nominal = field(default_factory=lambda: Nominal(1.0, 0.02))
     effects: dict[str, dict[str, Nominal]] = field(default_factory=dict)
-    known: Literal["both", "controller", "mechanics"] = "both"
+    known: Part = "both"
 
     def __post_init__(self) -> None:
         for name, parameters in self.effects.items():

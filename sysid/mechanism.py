@@ -57,13 +57,21 @@ def mjcf_mechanism(mjcf: str | Path, drive: str | Path) -> Mechanism:
     Raises:
         InputError: a file that cannot be read, a joint that is in one of them only.
     """
+    return model_mechanism(load_mjcf(mjcf), load_yaml(DriveFile, drive).joints, mjcf)
+
+
+def load_mjcf(mjcf: str | Path) -> Any:
+    """Compiles an MJCF file of a user.
+
+    Raises:
+        InputError: a file that cannot be read, or that MuJoCo does not compile.
+    """
     try:
-        model = mujoco.MjModel.from_xml_path(str(check_files(mjcf)))
+        return mujoco.MjModel.from_xml_path(str(check_files(mjcf)))
     except (ValueError, OSError) as error:
         if isinstance(error, InputError):
             raise
         raise InputError(mjcf, "", error, "an MJCF file") from error
-    return model_mechanism(model, load_yaml(DriveFile, drive).joints, mjcf)
 
 
 def model_mechanism(

@@ -76,17 +76,25 @@ def _actuators(model: Any, joint: str) -> list[int]:
     ]
 
 
+def actuator_gains(model: Any, joint: str) -> list[tuple[str, float, float]]:
+    """Returns name, kp [N·m/rad] and kd [N·m·s/rad] of a joint's position actuators."""
+    found = []
+    for i in _actuators(model, joint):
+        square = float(model.actuator_gear[i, 0]) ** 2
+        kp, kd = (float(-model.actuator_biasprm[i, k]) * square for k in (1, 2))
+        if kp > 0.0:
+            found.append((model.actuator(i).name, kp, kd))
+    return found
+
+
 def _check_gains(model: Any, joint: str, drive: JointDrive, source: object) -> None:
     """Refuses position actuators that contradict the gains of the drive."""
-    for i in _actuators(model, joint):
-        gear = float(model.actuator_gear[i, 0])
-        kp = float(-model.actuator_biasprm[i, 1]) * gear**2
-        kd = float(-model.actuator_biasprm[i, 2]) * gear**2
+    for actuator, kp, kd in actuator_gains(model, joint):
         for name, value in {"kp": kp, "kd": kd}.items():
             known: Nominal = getattr(drive, name)
-            if kp > 0.0 and value and not _agrees(value, known):
+            if value and not _agrees(value, known):
                 given = f"{value:g} here, {known.value:g} in drive.yaml"
-                where = f"actuator {model.actuator(i).name}, {name}"
+                where = f"actuator {actuator}, {name}"
                 raise InputError(source, where, given, "the same in both")
 
 

@@ -36,7 +36,7 @@ COMMANDS = (
     "tasks",
     "doctor",
 )
-SYSID = ("info", "excite", "calibrate", "diagnose", "transfer")
+SYSID = ("info", "describe", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 
 BAD_INPUT, KEYBOARD = 2, 130

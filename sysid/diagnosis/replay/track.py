@@ -36,6 +36,21 @@ def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointT
     Raises:
         InputError: joints that the mechanism lacks, or no piece that is long enough.
     """
+    pieces, bodies, step_s = measured_pieces(logs, mechanism)
+    return [
+        _track(_Joint(mechanism, logs, pieces, bodies, step_s, j))
+        for j in range(len(logs[0].header.joints))
+    ]
+
+
+def measured_pieces(
+    logs: Sequence[MeasuredLog], mechanism: Mechanism
+) -> tuple[list[Piece], list[Bodies], float]:
+    """Puts records on a common grid: pieces, what bodies do in them, and the step [s].
+
+    Raises:
+        InputError: joints that the mechanism lacks, or no piece that is long enough.
+    """
     joints = logs[0].header.joints
     for log in logs:
         if log.header.joints != joints:
@@ -63,10 +78,7 @@ def all_tracks(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> list[JointT
         bodies_along(mechanism, joints, JointMotion(p.pos, p.vel, p.acc), pulls[p.log])
         for p in pieces
     ]
-    return [
-        _track(_Joint(mechanism, logs, pieces, bodies, step_s, j))
-        for j in range(len(joints))
-    ]
+    return pieces, bodies, step_s
 
 
 @dataclass(frozen=True, eq=False)
