@@ -20,7 +20,10 @@ from sysid.mechanism import Mechanism, joint_address, joint_range
 STEP_S = 0.001
 _SHRINK = 0.75
 _MAX_ROUNDS = 12
-_PATH = ("transport_delay", "command_quantization", "lowpass_cutoff", "slew_limit")
+_PATH = (
+    *("transport_delay", "command_quantization", "lowpass_cutoff"),
+    *("slew_limit", "directional_slew"),
+)
 
 
 @dataclass(frozen=True, eq=False)

@@ -31,10 +31,14 @@ class JointDrive:
         wh = math.tan(min(math.pi * cutoff * h, 1.5))
         self.pole, self.weight = (1.0 - wh) / (1.0 + wh), wh / (1.0 + wh)
         self.slew = min(value("slew_limit", "speed_rad_s", math.inf), joint.slew_rad_s)
+        self.up = value("directional_slew", "up_rad_s", math.inf)
+        self.down = value("directional_slew", "down_rad_s", math.inf)
         self.grid = value("command_quantization", "step_rad", 0.0)
         self.kp = joint.kp * value("stiffness", "scale", 1.0)
         self.kd = joint.kd * value("damping", "scale", 1.0)
         self.zone = value("deadband", "half_width_rad", 0.0)
+        self.start = value("start_torque", "torque_nm", 0.0)
+        self.still = value("start_torque", "from_rad", 0.0)
         self.limit = min(value("torque_limit", "limit_nm", math.inf), joint.limit_nm)
         self.slope = value("torque_slope_limit", "slope_nm_s", math.inf)
         self.scale = value("encoder_scale", "scale", 1.0)
@@ -81,12 +85,14 @@ class JointDrive:
         mean = self.weight * (target + self.input)
         self.filtered = self.pole * self.filtered + mean if self.smooths else target
         self.input = target
-        step = self.slew * self.h
-        self.command += min(max(self.filtered - self.command, -step), step)
+        up, down = (self.h * min(self.slew, x) for x in (self.up, self.down))
+        self.command += min(max(self.filtered - self.command, -down), up)
         error = self.command - self.encoder(q)
         if self.zone:
             error -= min(max(error, -self.zone), self.zone)
         asked = self.kp * error - self.kd * self._encoder_speed(q, v)
+        if abs(error) > self.still:
+            asked += math.copysign(self.start, error)
         asked = min(max(asked, -self.limit), self.limit)
         if self.slope < math.inf:
             rise = self.slope * self.h

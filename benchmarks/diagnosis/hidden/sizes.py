@@ -75,6 +75,13 @@ def _below(name: str, parameter: str, nominal: str, top: float) -> Apply:
     return apply
 
 
+def _one_way(mechanism, joint, size, rng):
+    """A speed limit of one direction."""
+    way = "up_rad_s" if rng.random() < 0.5 else "down_rad_s"
+    speed = min(mechanism.joints[joint].slew_rad_s, 8.0) / size
+    return mechanism.with_effect(joint, "directional_slew", **{way: speed})
+
+
 def _slope(mechanism, joint, size, rng):
     """As if the error could grow by 20 rad/s at size 1."""
     slope = 20.0 * mechanism.joints[joint].kp / size
@@ -188,10 +195,16 @@ SCALES: dict[str, Scale] = {
         "slew_rad_s",
         1.2,
     ),
+    "directional_slew": Scale(_one_way, 1.0, 40.0, "slew_rad_s", 1.2),
     "torque_slope_limit": Scale(_slope, 1e-2, 1e3),
     "stiffness": Scale(_effect("stiffness", scale=_factor), 1e-2, 1.2, "kp", 0.2),
     "damping": Scale(_effect("damping", scale=_factor), 1e-2, 1.2, "kd", 0.4),
     "deadband": Scale(_effect("deadband", half_width_rad=_size), 1e-4, 0.1),
+    "start_torque": Scale(
+        _effect("start_torque", torque_nm=_size, from_rad=_uniform(0.001, 0.006)),
+        1e-4,
+        1.0,
+    ),
     "torque_limit": Scale(
         _below("torque_limit", "limit_nm", "limit_nm", 2.0), 1.0, 100.0, least=1.2
     ),

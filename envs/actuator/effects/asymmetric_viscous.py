@@ -21,6 +21,7 @@ EFFECT = EffectKind(
     },
     acts={Stage.FRICTION: _act},
     confusable_with={
+        "directional_slew": "effort at constant speed: friction needs it",
         "asymmetric_friction": "ramps in both directions at several speeds",
         "viscous_friction": "ramps in both directions at several speeds",
     },

@@ -15,6 +15,7 @@ EFFECT = EffectKind(
     },
     acts={Stage.FRICTION: _act},
     confusable_with={
+        "start_torque": "effort: a start torque is in it, friction is not",
         "deadband": "another kp, or effort at rest",
         "load_friction": "the same motion under two loads",
         "stribeck_friction": "slow ramps at four speeds",

@@ -21,6 +21,7 @@ EFFECT = EffectKind(
         "coulomb_friction": "another kp: the zone of friction shrinks as 1/kp; or "
         "effort at rest, which is exactly 0 in a deadband",
         "backlash": "pull from outside with the deadband off",
+        "start_torque": "effort at its edge: from 0 on, or with a jump",
         "stiffness": "holds under two loads",
         "hysteresis": "small loops: a deadband does not spring back",
         "command_quantization": "slow ramp: stairs stand at fixed commands",

@@ -42,6 +42,7 @@ EFFECT = EffectKind(
     },
     acts={Stage.COMMAND: _act},
     confusable_with={
+        "directional_slew": "steps both ways: one limit is the same in both",
         "lowpass_cutoff": "steps of two sizes: the slope of a limit stays the same",
         "torque_limit": "effort: flat at a torque limit, small at a speed limit",
         "viscous_friction": "effort at constant speed: friction needs it, a limit not",

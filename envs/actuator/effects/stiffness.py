@@ -15,6 +15,7 @@ EFFECT = EffectKind(
     confusable_with={
         "armature": "a known load or the effort: without one only ratios are seen",
         "payload_mass": "effort at rest: a load changes it, a gain does not",
+        "start_torque": "amplitude: a start torque does not grow with the error",
         "deadband": "holds under two loads: a gain gives an error like the load",
         "encoder_scale": "full range without load: a gain error leaves no error there",
         "torque_limit": "amplitude: a limit leaves small motions alone",

@@ -17,6 +17,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from envs.actuator.effects.command_quantization import quantized
+from envs.actuator.effects.directional_slew import towards
 from envs.actuator.effects.lowpass_cutoff import filtered
 from envs.actuator.effects.slew_limit import limited
 
@@ -25,6 +26,7 @@ EFFECTS = (
     "command_quantization",
     "lowpass_cutoff",
     "slew_limit",
+    "directional_slew",
     "sensor_latency",
     "clock_drift",
 )
@@ -80,7 +82,7 @@ def command_path(
     """
     grid, age = _grid(params), _age(params, dt)
     cutoff = _value(params, "lowpass_cutoff", "cutoff_hz", jnp.inf)
-    speed = _value(params, "slew_limit", "speed_rad_s", jnp.inf)
+    speeds = _speeds(params)
     lag_s = 1.0 / (2.0 * jnp.pi * cutoff)
 
     def step(carry, row):
@@ -96,14 +98,16 @@ def command_path(
             last, before = smooth, command
             goal = quantized(target[:, None], grid)
             smooth = _chosen(acts, filtered(last, goal, cutoff, h), last)
-            moved = _pursuit(before, last, smooth, speed, h)
+            # Without a low-pass the goal is there at once, and does not come evenly.
+            since = _chosen(jnp.isinf(cutoff), smooth, last)
+            moved = _pursuit(before, since, smooth, speeds, h)
             command = _chosen(acts, moved, before)
             follows = (before == last) & (command == smooth)
             mean = goal - (smooth - last) * lag_s / h
             total += part * jnp.where(follows, mean, 0.5 * (before + command))
             h = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
             there = filtered(last, goal, cutoff, h)
-            there = _pursuit(before, last, there, speed, h)
+            there = _pursuit(before, since, there, speeds, h)
             passed += acts * (start < _WITHIN) * (there - passed)
         return (smooth, command), (command, total, command - passed)
 
@@ -184,17 +188,30 @@ def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):
     return 0.5 * (rest + jnp.concatenate([rest[1:], rest[-1:]]))
 
 
-def _pursuit(command, last, goal, speed, h):
+def _speeds(params: Params) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
+    """Largest speeds up and down [rad/s]."""
+    both = _value(params, "slew_limit", "speed_rad_s", jnp.inf)
+    up, down = (
+        _value(params, "directional_slew", f"{way}_rad_s", jnp.inf)
+        for way in ("up", "down")
+    )
+    return jnp.minimum(both, up), jnp.minimum(both, down)
+
+
+def _pursuit(command, last, goal, speeds, h):
     """Moves at a limited speed towards a goal that moves evenly from `last` to `goal`.
 
     Where the goal comes to meet it, the command turns round with it within the step.
     """
-    gap, reach = last - command, speed * h
+    gap = last - command
+    speed = towards(jnp.where(gap == 0.0, goal - last, gap), *speeds)
+    reach = speed * h
     closing = reach - jnp.sign(gap) * (goal - last)
     ends = closing > 0.0
     part = jnp.clip(jnp.abs(gap) / _chosen(ends, closing, 1.0), 0.0, 1.0)
     part = _chosen(ends, part, 1.0 * (gap != 0.0))
     met = command + jnp.sign(gap) * _chosen(part > 0.0, part * reach, 0.0)
+    speed = towards(goal - met, *speeds)
     there = limited(met, goal, speed, jnp.maximum(1.0 - part, 0.0) * h)
     return _chosen(jnp.isfinite(speed), there, goal)
 

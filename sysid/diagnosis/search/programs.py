@@ -25,7 +25,7 @@ COSTLY = (
 )
 """Effects that take longer than a tenth of a simulation each."""
 
-PATH = ("lowpass_cutoff", "slew_limit")
+PATH = ("lowpass_cutoff", "slew_limit", "directional_slew")
 """Effects with which the command depends on where it was."""
 
 MOST = 2

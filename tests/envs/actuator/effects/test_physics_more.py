@@ -26,6 +26,40 @@ def test_a_cold_motor_is_the_plain_one():
     assert found == pytest.approx(plain, abs=1e-6)
 
 
+def test_a_limit_of_each_direction():
+    """Steps up and down take their own times; alike both are the plain limit."""
+    target = np.concatenate([rig.jump(1.0, 0.6), rig.hold(0.0, 0.6)])
+    slews = {"directional_slew": {"up_rad_s": 2.0, "down_rad_s": 5.0}}
+    command = rig.run(slews, target)[2].command
+    speed = np.diff(command) / rig.DT
+    assert speed.max() == pytest.approx(2.0, rel=1e-3)
+    assert speed.min() == pytest.approx(-5.0, rel=1e-3)
+    alike = {"directional_slew": {"up_rad_s": 2.0, "down_rad_s": 2.0}}
+    plain = rig.run({"slew_limit": {"speed_rad_s": 2.0}}, target)[0]
+    assert rig.run(alike, target)[0] == pytest.approx(plain, abs=1e-6)
+    assert np.max(np.abs(rig.run(slews, target)[0] - plain)) > 0.1
+
+
+def test_a_start_torque_jumps_beyond_a_small_error():
+    """Of a blocked joint: kp e, and S more from e₀ on, both ways."""
+    start = {"start_torque": {"torque_nm": 0.3, "from_rad": 0.05}}
+    blocked = {"coulomb_friction": {"torque_nm": 10.0}}
+    for error in (0.03, 0.07, -0.04, -0.2):
+        x = rig.run({**start, **blocked}, rig.hold(error, 0.01))[2]
+        more = 0.3 * np.sign(error) if abs(error) > 0.05 else 0.0
+        assert x.effort[0] == pytest.approx(rig.KP * error + more, rel=1e-5)
+
+
+def test_a_start_torque_overcomes_friction_that_holds_without_it():
+    """A servo that would rest in its zone of friction comes as near as e₀."""
+    friction = {"coulomb_friction": {"torque_nm": 0.1}}
+    start = {"start_torque": {"torque_nm": 0.09, "from_rad": 0.002}}
+    rests = rig.run(friction, rig.jump(0.2, 3.0))[0][-1]
+    comes = rig.run({**start, **friction}, rig.jump(0.2, 3.0))[0][-1]
+    assert abs(0.2 - rests) > 0.02
+    assert abs(0.2 - comes) < 0.008
+
+
 def test_supply_sag_knows_the_sum_of_all_efforts():
     sag = {"supply_sag": {"sag_per_nm": 0.4}}
     for others in (0.0, 3.0):

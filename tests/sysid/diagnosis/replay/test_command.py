@@ -62,6 +62,24 @@ def test_a_limit_that_is_absent_is_none():
     assert np.diff(slow)[50:] == pytest.approx(0.5, abs=1e-4)
 
 
+def test_limits_of_both_directions_are_those_of_the_chain():
+    """The exact path against steps of 10 µs of the effect in the chain."""
+    targets = np.where(ROWS % 100 < 50, 1.0, 0.0) + 0.2 * np.sin(0.05 * ROWS)
+    limits = {"up_rad_s": jnp.array([1.5]), "down_rad_s": jnp.array([4.0])}
+    path, _ = path_at(0.0, targets, directional_slew=limits)
+    fine, command, kept = 1000, targets[0], []
+    for target in targets:
+        kept.append(command)
+        for _ in range(fine):
+            step = np.clip(target - command, -4.0 * DT / fine, 1.5 * DT / fine)
+            command += step
+    assert path[1:] == pytest.approx(np.array(kept)[1:], abs=1e-3)
+    both = {"speed_rad_s": jnp.array([2.0])}
+    alike = {"up_rad_s": jnp.array([2.0]), "down_rad_s": jnp.array([2.0])}
+    one = path_at(0.4, targets, slew_limit=both)[0]
+    assert path_at(0.4, targets, directional_slew=alike)[0] == pytest.approx(one)
+
+
 @pytest.mark.parametrize("delay_rows", [0.0, 0.4, 2.7])
 def test_without_a_limit_the_mean_needs_no_path(delay_rows):
     """Rounded, late and of a drifting clock; a limit of speed is not seen."""
