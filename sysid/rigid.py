@@ -1,5 +1,6 @@
 """Rigid-body dynamics around joints along a motion, from the MuJoCo model."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import jax.numpy as jnp
@@ -233,6 +234,22 @@ def _coriolis(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     finally:
         model.opt.gravity[:] = kept
     return result
+
+
+def carrying_bodies(
+    mechanism: Mechanism, joints: Sequence[str]
+) -> Int[np.ndarray, " v"]:
+    """Numbers of the bodies that carry the load of some joints; see `PAYLOAD`.
+
+    Args:
+        mechanism: whose bodies they are.
+        joints: names.
+
+    Source:
+        Ours: a load hangs on the last body of a chain.
+    """
+    model = mechanism.model
+    return _payload(model, model.jnt_bodyid[[model.joint(j).id for j in joints]])
 
 
 def _payload(model: mujoco.MjModel, body: np.ndarray) -> Int[np.ndarray, " v"]:

@@ -5,6 +5,8 @@ import jax.numpy as jnp
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 _SHARE = Parameter("1", 0.0, 1.0, lognormal(0.1, 2.5), identity=0.0)
+_DRIVE = Parameter("1", 0.0, 0.8, lognormal(0.1, 2.5), identity=0.0)
+"""Gears that keep more of the torque than that move nothing."""
 
 
 def _act(params: Params, state, x, dt):
@@ -15,7 +17,7 @@ def _act(params: Params, state, x, dt):
 EFFECT = EffectKind(
     name="load_friction",
     equation="F = |K_m τ − K_e τ_load|; with K_m = K_e independent of direction",
-    parameters={"drive_share": _SHARE, "load_share": _SHARE},
+    parameters={"drive_share": _DRIVE, "load_share": _SHARE},
     acts={Stage.FRICTION: _act},
     confusable_with={
         "coulomb_friction": "the same motion under three loads or with three kp",

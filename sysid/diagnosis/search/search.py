@@ -31,6 +31,9 @@ MOST = 3
 EXCESS = 1.5
 """Mean squared whitened residual above which something may be unexplained."""
 
+STRAINED = 25.0
+"""Squared prior deviations of the nuisance parameters that are no accident [1]."""
+
 
 @dataclass(frozen=True, eq=False)
 class Search:
@@ -87,7 +90,9 @@ class Examined:
 def search(problem: Problem) -> Search:
     """Runs the whole search on one joint.
 
-    Without repeats it runs again with what the first result leaves as noise.
+    Without repeats it runs again with what the first result leaves as noise: if there
+    are causes, or if parameters had to leave their tolerances for it. What a model errs
+    by counts as white noise in the first run, and no tolerance holds against that.
     """
     problem, base = settled(problem)
     problem = coupled(problem, base)
@@ -95,7 +100,8 @@ def search(problem: Problem) -> Search:
     if output is not None:
         problem, base = settled_output(output, base)
     found = _searched(problem, base)
-    if problem.repeat or not found.best.effects:
+    strained = base.penalty > STRAINED
+    if problem.repeat or not (found.best.effects or strained):
         return found
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]

@@ -48,9 +48,26 @@ def accepted(problem: Problem, smaller: Model, larger: Model, base: Model) -> bo
             held = heldout_gain(smaller, larger, problem.samples)
             return held > NOMINAL_THRESHOLD
         return gain > max(NOMINAL_THRESHOLD, least)
+    if "load_friction" in added and not _predicts_effort(problem, smaller, larger):
+        return False
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     removes = _removes_enough(problem, smaller, larger, base)
     return gain > max(threshold, least) and removes
+
+
+def _predicts_effort(problem: Problem, smaller: Model, larger: Model) -> bool:
+    """Whether friction that grows with the torque predicts the torque better, too.
+
+    A share K of the drive's torque makes the residual smaller by 1 − K whatever it
+    lacks, and the torque that it predicts, f / (1 − K), wrong by as much more. Where
+    repeats say what is noise, the residual need not be that of the torque.
+    """
+    if problem.repeat or not problem.data.effort.all():
+        return True
+    (where, *_) = problem.space.of("load_friction")
+    share = float(problem.space.slots[where].value(larger.fit.theta[where]))
+    passed = max(1.0 - share, 1e-3) ** 2
+    return bool(larger.errors[1] < passed * smaller.errors[1])
 
 
 def _removes_enough(

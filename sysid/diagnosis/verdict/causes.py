@@ -9,6 +9,7 @@ from sysid.diagnosis.search.coupling import EFFECT as COUPLING
 from sysid.diagnosis.search.intervals import standard_errors
 from sysid.diagnosis.search.parameters import Slot
 from sysid.diagnosis.search.search import Examined, Search
+from sysid.diagnosis.verdict.shared import combined, disagree, sharing
 from sysid.mechanism import Mechanism
 from sysid.result import Cause, Estimate
 
@@ -25,15 +26,13 @@ def causes_of(searched: Sequence[Examined], mechanism: Mechanism) -> list[Cause]
             by_effect.setdefault(effect, []).append(e)
     causes = []
     for effect, members in by_effect.items():
-        joints = tuple(e.track.joint for e in members)
-        places = _places(joints, mechanism, searched)
-        if effect == COUPLING:  # each has another joint that pulls
-            places = [(joint, (joint,)) for joint in joints]
-        for where, inside in places:
-            chosen = [e for e in members if e.track.joint in inside]
+        for where, chosen in _places(effect, members, mechanism, searched):
             gain = sum(evidence(e.found, effect) for e in chosen)
             other = chosen[0].track.other if effect == COUPLING else ""
-            causes.append(Cause(effect, where, _pooled(chosen, effect), gain, other))
+            each = [estimates(e.found, e.found.best, effect) for e in chosen]
+            one = len(sharing(effect, _names(chosen), mechanism)) == 1
+            size = combined(each, HALF_WIDTH) if one else _spanned(each)
+            causes.append(Cause(effect, where, size, gain, other))
     return sorted(causes, key=lambda c: -c.evidence)
 
 
@@ -42,25 +41,44 @@ def evidence(found: Search, effect: str) -> float:
     return round(found.gain(effect), 3)
 
 
+def _names(members: Sequence[Examined]) -> tuple[str, ...]:
+    return tuple(e.track.joint for e in members)
+
+
 def _places(
-    joints: tuple[str, ...], mechanism: Mechanism, searched: Sequence[Examined]
-) -> list[tuple[str, tuple[str, ...]]]:
-    """Returns the class that the joints are, or each of them by its name."""
-    present = {e.track.joint for e in searched}
-    if len(present) == 1:
-        return [(joints[0], joints)]
-    if set(joints) == present and len(present) > 1:
-        return [("all", joints)]
-    for name, members in mechanism.classes.items():
-        inside = present.intersection(members)
-        if len(inside) > 1 and set(joints) == inside:
-            return [(name, joints)]
-    return [(joint, (joint,)) for joint in joints]
+    effect: str,
+    members: Sequence[Examined],
+    mechanism: Mechanism,
+    searched: Sequence[Examined],
+) -> list[tuple[str, list[Examined]]]:
+    """Returns where an effect is: the joints of one body, a class, or each joint."""
+    joints, present = _names(members), set(_names(searched))
+    by_name = dict(zip(joints, members, strict=True))
+    one = [[by_name[j] for j in g] for g in sharing(effect, joints, mechanism)]
+    each = [[e] for e in members]
+    if effect == COUPLING or (one != each and any(_apart(effect, g) for g in one)):
+        groups = each  # each has another joint that pulls, or a size of its own
+    elif one != each or len(present) == 1:
+        groups = one
+    else:
+        known = [("all", tuple(present)), *mechanism.classes.items()]
+        for name, others in known:
+            inside = present.intersection(others)
+            if len(inside) > 1 and set(joints) == inside:
+                return [(name, list(members))]
+        groups = each
+    whole = len(present) > 1 and len(groups) == 1 and len(groups[0]) == len(present)
+    return [("all" if whole else " and ".join(_names(g)), g) for g in groups]
 
 
-def _pooled(members: Sequence[Examined], effect: str) -> dict[str, Estimate]:
-    """Mean of the joints' estimates, with an interval that holds them all."""
+def _apart(effect: str, members: Sequence[Examined]) -> bool:
+    """Whether joints that should feel one body disagree about it."""
     each = [estimates(e.found, e.found.best, effect) for e in members]
+    return len(each) > 1 and disagree(each, HALF_WIDTH)
+
+
+def _spanned(each: Sequence[dict[str, Estimate]]) -> dict[str, Estimate]:
+    """Mean of the joints' estimates, with an interval that holds them all."""
     pooled = {}
     for name, one in each[0].items():
         values = [x[name] for x in each]

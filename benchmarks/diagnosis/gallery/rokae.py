@@ -1,0 +1,47 @@
+"""A Rokae AR5 arm of seven joints, measured torques: F. Jie."""
+
+import io
+
+import numpy as np
+
+from benchmarks.diagnosis.gallery.models import urdf_model
+from benchmarks.diagnosis.gallery.record import Made, Read, Record
+from sysid.drive import JointDrive, Nominal
+from sysid.logs.log import make_log
+from sysid.mechanism import model_mechanism
+
+_JOINTS = tuple(f"AR5-5_07R-W4C4A2_joint_{k}" for k in range(1, 8))
+
+_BASE_QUAT_W = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
+"""The base is mounted sideways (step2_dynamics_parameter_estimation.py, `R_base`)."""
+
+
+def _made(read: Read) -> Made:
+    path = "src/config/dynamics_identification_data_real.csv"
+    table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
+    columns = {}
+    for k, joint in enumerate(_JOINTS):
+        angle = table[f"q{k}"]
+        columns |= {f"cmd.{joint}": angle, f"pos.{joint}": angle}
+        columns[f"tau.{joint}"] = table[f"tau{k}"]
+    log = make_log(
+        _JOINTS, table["time"], columns, source=path, palm_quat_w=_BASE_QUAT_W
+    )
+    model = urdf_model(read("urdf/AR5-5_07R-W4C4A2.urdf"))
+    drive = JointDrive(Nominal(1.0), Nominal(1.0), known="mechanics")
+    return [log], model_mechanism(model, dict.fromkeys(_JOINTS, drive))
+
+
+RECORD = Record(
+    name="rokae_friction",
+    robot="arm Rokae AR5, seven joints, angles and torques, 50 Hz",
+    repository="FrankJIE09/Dynamics_identification_Frank",
+    commit="758dc8d6f78e",
+    licence="none",
+    half="first",
+    effects=("coulomb_friction", "viscous_friction"),
+    documented="Coulomb friction of 0.1 to 0.43 N·m in every joint, viscous "
+    "friction of up to 0.58 N·m·s/rad in four",
+    where="scripts/data_output/dynamics_parameters_friction.csv",
+    made=_made,
+)
