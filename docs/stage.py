@@ -15,6 +15,7 @@ WANTED = (
     "*.md",
     "LICENSE",
     "docs/*/*.md",
+    "docs/results/gallery/*.md",
     "docs/images/*",
     "notebooks/*.ipynb",
     "notebooks/policies/README.md",

@@ -1,6 +1,6 @@
 """Rigid-body dynamics around joints along a motion, from the MuJoCo model."""
 
-from collections.abc import Sequence
+import copy
 from dataclasses import dataclass
 
 import jax.numpy as jnp
@@ -9,10 +9,8 @@ from jaxtyping import Float, Int
 
 from envs.actuator.surroundings import Gravity
 from envs.physics.quiet_mujoco import mujoco
+from sysid.carried import carrying_bodies
 from sysid.mechanism import Mechanism
-
-PAYLOAD = "payload"
-"""Name of the body that carries the load, where there is one."""
 
 _MOST = 4
 """Largest number of rows between two postures that are evaluated."""
@@ -34,7 +32,7 @@ class Bodies:
         moment: m, in the frame of the mount [kg·m].
         turned: m', mass a × (a × r); 0 for a slide [kg·m].
         push: torque of the other joints' motion on each joint [N·m].
-        payload_moment, payload_shift, payload_inertia: see `Gravity`.
+        payload_moment, payload_shift, payload_inertia, payload_push: see `Gravity`.
         payload_kg: mass of the payload by joint.
         gravity: in the frame of the mount [m/s²].
     """
@@ -46,6 +44,7 @@ class Bodies:
     payload_moment: Float[np.ndarray, "n v 3"]
     payload_shift: Float[np.ndarray, "n v 3 3"]
     payload_inertia: Float[np.ndarray, "n v"]
+    payload_push: Float[np.ndarray, "n v"]
     payload_kg: Float[np.ndarray, " v"]
     gravity: Float[np.ndarray, "3"]
 
@@ -74,6 +73,7 @@ class Bodies:
             payload_moment=jnp.asarray(self.payload_moment[:, j]),
             payload_shift=jnp.asarray(self.payload_shift[:, j]),
             payload_inertia=jnp.asarray(self.payload_inertia[:, j]),
+            payload_push=jnp.asarray(self.payload_push[:, j]),
         )
 
 
@@ -140,7 +140,7 @@ def bodies_along(
     model = mechanism.model
     ids = [model.joint(j).id for j in joints]
     body = model.jnt_bodyid[ids]
-    payload = _payload(model, body)
+    payload = carrying_bodies(model, body)
     count = len(motion.pos)
     rows = np.unique(np.append(np.arange(0, count, _apart(motion.pos)), count - 1))
     f = _evaluated(model, ids, payload, motion, rows)
@@ -159,11 +159,43 @@ def bodies_along(
         "rate": f["rate"],
     }
     fine = {k: interpolated(rows, v, count) for k, v in coarse.items()}
-    m, rate = fine["matrix"], fine.pop("rate")
-    inertia = np.diagonal(m, axis1=1, axis2=2)
-    push = inertia * motion.acc - np.einsum("nij,nj->ni", m, motion.acc) - rate
-    carried = model.body_mass[payload]
-    return Bodies(payload_kg=carried, gravity=gravity, push=push, **fine)
+    push = _push(fine["matrix"], fine.pop("rate"), motion)
+    return Bodies(
+        payload_kg=model.body_mass[payload],
+        gravity=gravity,
+        push=push,
+        payload_push=_payload_push(model, ids, payload, motion, rows) - push,
+        **fine,
+    )
+
+
+def _push(
+    matrix: Float[np.ndarray, "n v v"],
+    rate: Float[np.ndarray, "n v"],
+    motion: JointMotion,
+) -> Float[np.ndarray, "n v"]:
+    """M_ii q̈_i − Σ_k M_ik q̈_k − c_i."""
+    inertia = np.diagonal(matrix, axis1=1, axis2=2)
+    return inertia * motion.acc - np.einsum("nij,nj->ni", matrix, motion.acc) - rate
+
+
+def _payload_push(
+    model: mujoco.MjModel,
+    ids: list[int],
+    payload: Int[np.ndarray, " v"],
+    motion: JointMotion,
+    rows: Int[np.ndarray, " k"],
+) -> Float[np.ndarray, "n v"]:
+    """The push of the other joints where each payload is heavier by 1 kg."""
+    pushes = np.zeros_like(motion.pos)
+    for body in np.unique(payload):
+        heavier = copy.copy(model)
+        heavier.body_mass[body] += 1.0
+        found = _evaluated(heavier, ids, payload, motion, rows)
+        fine = [interpolated(rows, found[k], len(motion.pos)) for k in ("m", "rate")]
+        felt = payload == body
+        pushes[:, felt] = _push(fine[0], fine[1], motion)[:, felt]
+    return pushes
 
 
 def _evaluated(
@@ -234,36 +266,3 @@ def _coriolis(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
     finally:
         model.opt.gravity[:] = kept
     return result
-
-
-def carrying_bodies(
-    mechanism: Mechanism, joints: Sequence[str]
-) -> Int[np.ndarray, " v"]:
-    """Numbers of the bodies that carry the load of some joints; see `PAYLOAD`.
-
-    Args:
-        mechanism: whose bodies they are.
-        joints: names.
-
-    Source:
-        Ours: a load hangs on the last body of a chain.
-    """
-    model = mechanism.model
-    return _payload(model, model.jnt_bodyid[[model.joint(j).id for j in joints]])
-
-
-def _payload(model: mujoco.MjModel, body: np.ndarray) -> Int[np.ndarray, " v"]:
-    """Returns for every joint the body that carries its load.
-
-    The body named `payload` where there is one, else the last body of the joint's
-    chain.
-    """
-    named = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, PAYLOAD)
-    result = []
-    for start in body:
-        below = [start]
-        for i in range(start + 1, model.nbody):
-            if model.body_parentid[i] in below:
-                below.append(i)
-        result.append(named if named in below else below[-1])
-    return np.array(result)

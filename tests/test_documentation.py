@@ -15,7 +15,7 @@ from fingers_mjx.cli.main import UsageError, make_parser
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = sorted(
-    [*ROOT.glob("*.md"), *ROOT.glob("docs/*/*.md"), ROOT / "deploy/README.md"]
+    [*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md"), ROOT / "deploy/README.md"]
 )
 PLACES = re.compile(r"/(work|tmp|home|root)/|localhost", re.IGNORECASE)
 
@@ -30,7 +30,8 @@ def commands(text):
 
 def module_path(module):
     """Modules are run by name, so that a file never stands in for a library."""
-    return module.replace(".", "/") + ".py"
+    path = module.replace(".", "/")
+    return path + "/__main__.py" if (ROOT / path).is_dir() else path + ".py"
 
 
 def name(path):

@@ -22,6 +22,8 @@ class Gravity:
         payload_shift: change of `payload_moment` by a shift of the payload along the
             x, y and z of the body that carries it [m/m]: rows a × e_k.
         payload_inertia: inertia about the joint of a payload of 1 kg [m²].
+        payload_push: torque on the joint by a payload of 1 kg that the motion of the
+            other joints accelerates [m²/s²].
     """
 
     gravity: Float[Array, "*j 3"]
@@ -30,6 +32,7 @@ class Gravity:
     payload_moment: Float[Array, "*j 3"]
     payload_shift: Float[Array, "*j 3 3"]
     payload_inertia: Float[Array, "*j"]
+    payload_push: Float[Array, "*j"]
 
 
 @flax.struct.dataclass

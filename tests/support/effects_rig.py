@@ -28,6 +28,7 @@ AROUND = Surroundings(
         payload_moment=np.cross(AXIS, ARM),
         payload_shift=np.cross(AXIS, np.eye(3)),
         payload_inertia=float(ARM @ ARM),
+        payload_push=0.0,
     ),
 )
 

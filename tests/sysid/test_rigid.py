@@ -61,3 +61,44 @@ def test_a_mount_that_lies_on_its_side_turns_gravity():
 def test_values_between_rows_lie_on_lines_and_stay_after_the_last():
     found = interpolated(np.array([0, 2]), np.array([[0.0], [4.0]]), 5)
     assert found[:, 0].tolist() == [0.0, 2.0, 4.0, 4.0, 4.0]
+
+
+ARM = """
+<mujoco><worldbody><body>
+<joint name="a" axis="0 1 0"/>
+<inertial pos="0 0 -0.1" mass="0.4" diaginertia="1e-3 1e-3 1e-3"/>
+<body pos="0 0 -0.25"><joint name="b" axis="0.6 0.8 0"/>
+<inertial pos="0 0.02 -0.12" mass="{mass}" diaginertia="1e-3 1e-3 1e-3"/>
+</body></body></worldbody></mujoco>"""
+
+
+def arm(mass):
+    return mujoco.MjModel.from_xml_string(ARM.format(mass=mass))
+
+
+def test_a_payload_weighs_turns_and_is_pushed_as_inverse_dynamics_says():
+    """Torques of the same motion with 0.3 kg more, by MuJoCo's inverse dynamics."""
+    t = np.arange(0.0, 2.0, 0.002)
+    angles = np.stack([0.7 * np.sin(5.0 * t), 0.5 * np.cos(8.0 * t)], 1)
+    speeds = np.stack([3.5 * np.cos(5.0 * t), -4.0 * np.sin(8.0 * t)], 1)
+    turns = np.stack([-17.5 * np.sin(5.0 * t), -32.0 * np.cos(8.0 * t)], 1)
+    motion = JointMotion(angles, speeds, turns)
+    drive = JointDrive(Nominal(1.0), Nominal(1.0))
+    mechanism = model_mechanism(arm(0.3), {"*": drive})
+    gravity = mount_gravity(mechanism, UPRIGHT)
+    bodies = bodies_along(mechanism, ("a", "b"), motion, gravity)
+
+    def torques(model):
+        data, found = mujoco.MjData(model), []
+        for q, v, a in zip(angles, speeds, turns, strict=True):
+            data.qpos[:], data.qvel[:], data.qacc[:] = q, v, a
+            mujoco.mj_inverse(model, data)
+            found.append(data.qfrc_inverse.copy())
+        return np.array(found)
+
+    more = torques(arm(0.6)) - torques(arm(0.3))
+    weighs = bodies.payload_moment @ gravity
+    needed = bodies.payload_inertia * turns - weighs - bodies.payload_push
+    size = np.abs(more).max()
+    assert 0.3 * needed == pytest.approx(more, abs=2e-3 * size)
+    assert np.abs(bodies.payload_push).max() > 0.1 * size

@@ -68,4 +68,7 @@ RECORD = Record(
     "where the author's search begins",
     where="src/sysid/dataset/dataset.json, `targets`; src/sysid/desc/robot.xml",
     made=_made,
+    remark="Wrong. Gains, friction, rotor and low-pass are all free here, since nobody"
+    " knows them, and a load that lies elsewhere takes up what the motion "
+    "lacks.",
 )

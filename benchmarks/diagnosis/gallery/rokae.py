@@ -44,4 +44,10 @@ RECORD = Record(
     "friction of up to 0.58 N·m·s/rad in four",
     where="scripts/data_output/dynamics_parameters_friction.csv",
     made=_made,
+    remark="Wrong by the rule: dry friction is found in joints 3, 5, 6 and 7, and of "
+    "the size that the authors give (0.30, 0.17, 0.19, 0.06 N·m), but as "
+    "Dahl's, which needs a few milliradians to build up, or as one that depends"
+    " on the direction. Joints turn by a tenth of that between two rows when "
+    "they reverse, so the records do show it; Coulomb friction alone gains half"
+    " as much.",
 )

@@ -57,4 +57,7 @@ RECORD = Record(
     "fitted to these records",
     where="params/feetech/m6.json; models: arXiv 2410.08650",
     made=_made,
+    remark="Open. A speed limit, which nobody documents, leaves a sixteenth of the "
+    "error; each of the four records has another motion and is a fold, and none"
+    " predicts the limit that only another one meets.",
 )

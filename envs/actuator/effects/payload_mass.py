@@ -6,9 +6,10 @@ from envs.actuator.effect import EffectKind, Parameter, Params, Stage, normal
 
 
 def _load(params: Params, state, x, dt):
-    """Adds weight and inertia of the mass where the caller carries its payload."""
+    """Adds weight and push of the mass where the caller carries its payload."""
     mass, world = params["mass_kg"], x.around.gravity
     per_kg = jnp.sum(world.payload_moment * world.gravity, axis=-1)
+    per_kg = per_kg + world.payload_push
     return state, x.replace(load=x.load + mass * per_kg)
 
 
@@ -32,7 +33,8 @@ def _change(params: Params, scene, fields):
 
 EFFECT = EffectKind(
     name="payload_mass",
-    equation="m = m₀ + Δm: Δτ = Δm (a × r) · g, ΔI = Δm |a × r|²",
+    equation="m = m₀ + Δm: Δτ = Δm (a × r) · (g − r̈ₒ), ΔI = Δm |a × r|², with the "
+    "acceleration r̈ₒ by the other joints",
     parameters={
         "mass_kg": Parameter("kg", -0.07, 1.0, normal(0.0, 0.02), identity=0.0)
     },

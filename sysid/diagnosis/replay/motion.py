@@ -21,7 +21,8 @@ class Motion:
         inertia: of the joint with all that it carries, in this posture [kg·m²].
         moment, turned: moment of the carried masses, and the same a quarter turn on
             [kg·m]; see `envs.actuator.surroundings.Gravity`.
-        payload_moment, payload_shift, payload_inertia: of a payload of 1 kg.
+        payload_moment, payload_shift, payload_inertia, payload_push: of a payload of
+            1 kg; see `envs.actuator.surroundings.Gravity`.
         others_nm: sum of the other joints' |torque| [N·m].
         other_q, other_nm: angle and torque of the joint that may pull on this one.
     """
@@ -40,6 +41,7 @@ class Motion:
     payload_moment: Float[Array, "*t p 3"]
     payload_shift: Float[Array, "*t p 3 3"]
     payload_inertia: Float[Array, "*t p"]
+    payload_push: Float[Array, "*t p"]
     others_nm: Float[Array, "*t p"]
     other_q: Float[Array, "*t p"]
     other_nm: Float[Array, "*t p"]

@@ -49,6 +49,7 @@ def surroundings_at(
             payload_moment=now.payload_moment,
             payload_shift=now.payload_shift,
             payload_inertia=now.payload_inertia,
+            payload_push=now.payload_push,
         ),
     )
     return around, load

@@ -30,7 +30,8 @@ def causes_of(searched: Sequence[Examined], mechanism: Mechanism) -> list[Cause]
             gain = sum(evidence(e.found, effect) for e in chosen)
             other = chosen[0].track.other if effect == COUPLING else ""
             each = [estimates(e.found, e.found.best, effect) for e in chosen]
-            one = len(sharing(effect, _names(chosen), mechanism)) == 1
+            several = len(chosen) > 1
+            one = several and len(sharing(effect, _names(chosen), mechanism)) == 1
             size = combined(each, HALF_WIDTH) if one else _spanned(each)
             causes.append(Cause(effect, where, size, gain, other))
     return sorted(causes, key=lambda c: -c.evidence)

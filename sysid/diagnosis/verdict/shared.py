@@ -11,9 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2
 
+from sysid.carried import carrying_bodies
 from sysid.mechanism import Mechanism
 from sysid.result import Estimate
-from sysid.rigid import carrying_bodies
 
 LOADS = ("payload_mass", "payload_com")
 MOUNT = "mount_tilt"
@@ -37,7 +37,9 @@ def sharing(
         return [(joint,) for joint in joints]
     if effect == MOUNT:
         return [tuple(joints)]
-    bodies = carrying_bodies(mechanism, joints)
+    model = mechanism.model
+    moved = model.jnt_bodyid[[model.joint(j).id for j in joints]]
+    bodies = carrying_bodies(model, moved)
     return [
         tuple(j for j, other in zip(joints, bodies, strict=True) if other == body)
         for body in dict.fromkeys(bodies.tolist())
