@@ -54,6 +54,10 @@ REMAINING = 0.2
 equation is right to half of its trace. Of a friction that falls with speed 0.17 remains
 about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
 
+LITTLE = 0.01
+"""Share of a squared error below which next to nothing of it is left; friction that
+cancels four fifths of a torque leaves 0.04."""
+
 TRIED = 5
 """Number of candidates of a stage that are judged, best first."""
 
@@ -163,10 +167,16 @@ class Judge:
         return needed and self.t_value(self.nominal(smaller), better) > LEVEL
 
     def _explains(self, smaller: Model, larger: Model) -> bool:
-        """Whether only the larger model leaves little more than noise in the effort."""
+        """Whether only the larger model leaves little more than noise in the effort.
+
+        Without repeats what is noise is not known, and it must leave next to nothing.
+        """
         before, after = smaller.errors.max(), larger.errors.max()
-        known = bool(self.problem.repeat) and bool(self.problem.data.effort.any())
-        return known and before > LEFT > after and after - 1 < REMAINING * (before - 1)
+        if not self.problem.data.effort.any():
+            return False
+        if not self.problem.repeat:
+            return bool(before > LEFT and after < LITTLE * before)
+        return bool(before > LEFT > after and after - 1 < REMAINING * (before - 1))
 
 
 def within_tolerances(problem: Problem, model: Model) -> Model:

@@ -55,11 +55,17 @@ def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
     assert says(Said(1.4, 7.4), before=381.0, after=0.5)
 
 
+def test_without_repeats_next_to_nothing_must_remain():
+    """A torque limit: 17,495 times what neighbouring samples do not share becomes 50."""
+    assert says(Said(1.4, 7.4, repeat=False), before=17_495.0, after=50.0)
+    assert not says(Said(1.4, 7.4, repeat=False), before=1_000.0, after=40.0)
+
+
 @pytest.mark.parametrize(
     "changed",
     [
         {"t": 0.5 * LEVEL},
-        {"repeat": False},
+        {"repeat": False, "after": 8.0},
         {"effort": False},
         {"after": 100.0},
         {"before": 1.8},
