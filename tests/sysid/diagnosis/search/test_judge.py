@@ -56,7 +56,7 @@ def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
 
 
 def test_without_repeats_next_to_nothing_must_remain():
-    """A torque limit: 17,495 times what neighbouring samples do not share becomes 50."""
+    """A torque limit: 17,495 times what neighbours do not share becomes 50."""
     assert says(Said(1.4, 7.4, repeat=False), before=17_495.0, after=50.0)
     assert not says(Said(1.4, 7.4, repeat=False), before=1_000.0, after=40.0)
 
