@@ -188,7 +188,7 @@ def _payload_push(
 ) -> Float[np.ndarray, "n v"]:
     """The push of the other joints where each payload is heavier by 1 kg."""
     pushes = np.zeros_like(motion.pos)
-    for body in np.unique(payload):
+    for body in np.unique(payload) if len(ids) > 1 else ():
         heavier = copy.copy(model)
         heavier.body_mass[body] += 1.0
         found = _evaluated(heavier, ids, payload, motion, rows)

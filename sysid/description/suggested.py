@@ -10,8 +10,8 @@ from sysid.description.stretches import Stretch
 PLATEAU = 0.1
 """Relative spread of speeds that are one speed."""
 
-SATURATED = 0.02
-"""Share of rows at the largest effort from which on that is a limit."""
+APPROACHES = 0.02
+"""Least share of rows that go fast to a target that stands, for a limit to show."""
 
 STANDS_S = 0.05
 """Time in which a target did not change, so that the servo sets the pace [s]."""
@@ -50,7 +50,7 @@ def _own_speed(stretches: Sequence[Stretch]) -> float:
     speed = joined([np.abs(s.vel) for s in stretches], rows)
     still = joined([_stands(s) for s in stretches], rows)
     fast = speed[still & (speed > 0.5 * np.percentile(speed, 99))]
-    if len(fast) < SATURATED * len(speed):
+    if len(fast) < APPROACHES * len(speed):
         return 0.0
     low, middle, high = np.percentile(fast, [25, 50, 75])
     return float(middle) if high - low < PLATEAU * middle else 0.0

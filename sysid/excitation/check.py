@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from envs.actuator.catalogue import effect_kind
 from envs.actuator.chain import JointInput, chain_step, init_states
+from envs.actuator.effect import Stage
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.plan import Limits, Plan, Schedule, make_plan
@@ -20,10 +21,6 @@ from sysid.mechanism import Mechanism, joint_address, joint_range
 STEP_S = 0.001
 _SHRINK = 0.75
 _MAX_ROUNDS = 12
-_PATH = (
-    *("transport_delay", "command_quantization", "lowpass_cutoff"),
-    *("slew_limit", "directional_slew"),
-)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,7 +135,7 @@ def _path(names, values, held):
     model = [
         (effect_kind(name), parameters)
         for name, parameters in zip(names, values, strict=True)
-        if name in _PATH
+        if Stage.COMMAND in effect_kind(name).acts
     ]
     zero = jnp.zeros(())
 

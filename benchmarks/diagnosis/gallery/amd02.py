@@ -4,9 +4,8 @@ import io
 
 import numpy as np
 
-from benchmarks.diagnosis.gallery.models import urdf_model
+from benchmarks.diagnosis.gallery.models import DRIVEN, driven_columns, urdf_model
 from benchmarks.diagnosis.gallery.record import Made, Read, Record
-from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
 
@@ -16,18 +15,16 @@ _JOINT, _PLACE = "ArmLfourth_Joint", 2
 def _made(read: Read) -> Made:
     path = "results/real_uart_capture_collect_joint_3.npz"
     table = np.load(io.BytesIO(read(path)), allow_pickle=False)
-    angle = table["q"][:, _PLACE]
-    columns = {f"cmd.{_JOINT}": angle, f"pos.{_JOINT}": angle}
-    columns[f"tau.{_JOINT}"] = table["tau_measured"][:, _PLACE]
+    angle, torque = (table[name][:, _PLACE] for name in ("q", "tau_measured"))
+    columns = driven_columns(_JOINT, angle, torque)
     log = make_log((_JOINT,), table["time"], columns, source=path)
     model = urdf_model(read("am_d02_model/urdf/AM-D02-AemLURDF0413.urdf"))
-    drive = JointDrive(Nominal(1.0), Nominal(1.0), known="mechanics")
-    return [log], model_mechanism(model, {_JOINT: drive})
+    return [log], model_mechanism(model, {_JOINT: DRIVEN})
 
 
 RECORD = Record(
     name="amd02_friction",
-    robot="third joint of an arm AM-D02, angle and torque, 33 Hz",
+    robot="third joint of an arm AM-D02, angle and torque, 32 Hz",
     repository="YIZHIXIAOCANGSHU/Friction-Identification-for-Manipulators",
     commit="f915751262ab",
     licence="none",

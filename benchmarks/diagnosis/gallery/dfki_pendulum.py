@@ -4,9 +4,8 @@ import io
 
 import numpy as np
 
-from benchmarks.diagnosis.gallery.models import pendulum_model
+from benchmarks.diagnosis.gallery.models import DRIVEN, driven_columns, pendulum_model
 from benchmarks.diagnosis.gallery.record import Made, Read, Record
-from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
 
@@ -19,18 +18,15 @@ def _made(read: Read) -> Made:
     for part in ("control_method_ddp", "control_method_direct_collocation"):
         path = f"results/{part}/data_measured.csv"
         table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
-        angle = table["position"]
-        columns = {"cmd.pendulum": angle, "pos.pendulum": angle}
-        columns["tau.pendulum"] = table["torque"]
+        columns = driven_columns("pendulum", table["position"], table["torque"])
         logs.append(make_log(("pendulum",), table["time"], columns, source=path))
     model = pendulum_model("pendulum", {0.5: 0.546, 0.25: 0.13}, _ROTOR_KGM2)
-    drive = JointDrive(Nominal(1.0), Nominal(1.0), known="mechanics")
-    return logs, model_mechanism(model, {"pendulum": drive})
+    return logs, model_mechanism(model, {"pendulum": DRIVEN})
 
 
 RECORD = Record(
     name="dfki_pendulum",
-    robot="pendulum of 0.68 kg on a T-Motor AK80-6, commanded torque, 300 to 500 Hz",
+    robot="pendulum of 0.68 kg on a T-Motor AK80-6, torques, 330 to 500 Hz",
     repository="dfki-ric-underactuated-lab/torque_limited_simple_pendulum",
     commit="ed17ea2d32a3",
     licence="BSD-3-Clause",

@@ -1,4 +1,4 @@
-"""A Miuzei servo of 25 kgf·cm with an arm, positions alone: M. Servin."""
+"""A Miuzei servo of 25 kgf·cm with an arm, positions alone."""
 
 import json
 

@@ -3,7 +3,14 @@
 import xml.etree.ElementTree as ET
 from typing import Any
 
+import numpy as np
+from jaxtyping import Float
+
 from envs.physics.quiet_mujoco import mujoco
+from sysid.drive import JointDrive, Nominal
+
+DRIVEN = JointDrive(Nominal(1.0), Nominal(1.0), known="mechanics")
+"""A joint whose logged torque drives it; how its servo comes to it is not known."""
 
 _OPTIONS = {
     "strippath": "true",
@@ -44,6 +51,23 @@ def urdf_model(text: bytes, payload: str = "") -> Any:
     options = ET.SubElement(robot, "mujoco")
     ET.SubElement(options, "compiler", _OPTIONS)
     return mujoco.MjModel.from_xml_string(ET.tostring(robot, encoding="unicode"))
+
+
+def driven_columns(
+    joint: str,
+    angle: Float[np.ndarray, " n"],
+    effort: Float[np.ndarray, " n"],
+    quantity: str = "tau",
+) -> dict[str, Float[np.ndarray, " n"]]:
+    """Columns of a joint that an effort drives: its target is its angle.
+
+    Args:
+        joint: its name.
+        angle: that was measured [rad].
+        effort: of its drive, in the unit of its quantity.
+        quantity: of the effort.
+    """
+    return {f"cmd.{joint}": angle, f"pos.{joint}": angle, f"{quantity}.{joint}": effort}
 
 
 def pendulum_model(name: str, parts: dict[float, float], armature: float = 0.0) -> Any:

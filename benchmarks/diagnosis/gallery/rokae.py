@@ -1,12 +1,11 @@
-"""A Rokae AR5 arm of seven joints, measured torques: F. Jie."""
+"""A Rokae AR5 arm of seven joints, measured torques."""
 
 import io
 
 import numpy as np
 
-from benchmarks.diagnosis.gallery.models import urdf_model
+from benchmarks.diagnosis.gallery.models import DRIVEN, driven_columns, urdf_model
 from benchmarks.diagnosis.gallery.record import Made, Read, Record
-from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
 
@@ -21,15 +20,12 @@ def _made(read: Read) -> Made:
     table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
     columns = {}
     for k, joint in enumerate(_JOINTS):
-        angle = table[f"q{k}"]
-        columns |= {f"cmd.{joint}": angle, f"pos.{joint}": angle}
-        columns[f"tau.{joint}"] = table[f"tau{k}"]
+        columns |= driven_columns(joint, table[f"q{k}"], table[f"tau{k}"])
     log = make_log(
         _JOINTS, table["time"], columns, source=path, palm_quat_w=_BASE_QUAT_W
     )
     model = urdf_model(read("urdf/AR5-5_07R-W4C4A2.urdf"))
-    drive = JointDrive(Nominal(1.0), Nominal(1.0), known="mechanics")
-    return [log], model_mechanism(model, dict.fromkeys(_JOINTS, drive))
+    return [log], model_mechanism(model, dict.fromkeys(_JOINTS, DRIVEN))
 
 
 RECORD = Record(

@@ -11,7 +11,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 from jaxtyping import Float
 
-from benchmarks.diagnosis.gallery.models import urdf_model
+from benchmarks.diagnosis.gallery.models import driven_columns, urdf_model
 from benchmarks.diagnosis.gallery.record import Made, Read, Record
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
@@ -83,9 +83,7 @@ def _made(read: Read) -> Made:
     table = np.loadtxt(io.BytesIO(read(path)), delimiter=",")[_USED]
     columns = {}
     for k, joint in enumerate(_JOINTS):
-        angle = table[:, 1 + k]
-        columns |= {f"cmd.{joint}": angle, f"pos.{joint}": angle}
-        columns[f"cur.{joint}"] = table[:, 13 + k]
+        columns |= driven_columns(joint, table[:, 1 + k], table[:, 13 + k], "cur")
     log = make_log(_JOINTS, table[:, 0] - table[0, 0], columns, source=path)
     text = read("UR10E_parameters.txt").decode()
     links = _identified(text, "pi_rgd").reshape(6, 10)
