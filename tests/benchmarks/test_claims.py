@@ -9,7 +9,13 @@ from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.spec import Sweep
 
 CLAIMS = Path(__file__).resolve().parents[2] / "benchmarks/claims"
-MEMBERS = {"ablation": (6, 12), "tuned_stock": (24, 2), "weights": (8, 6)}
+MEMBERS = {
+    "ablation": (6, 12),
+    "tuned_stock": (24, 2),
+    "weights": (8, 6),
+    "steering": (4, 2),
+    "steering_walker": (2, 2),
+}
 
 
 def swept(name):

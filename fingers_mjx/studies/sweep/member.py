@@ -46,7 +46,8 @@ def train_members(
         fresh: dict[Key, Member] = {}
         resumed: dict[Key, Member] = {}
         for key in keys:
-            before = stages[key][number - 1].path if number else None
+            begin = root / spec.warm_start if spec.warm_start else None
+            before = stages[key][number - 1].path if number else begin
             one = stages[key][number]
             if key in lost or (start := start_of(one, before)) is None:
                 continue
@@ -80,7 +81,8 @@ def start_of(training: Training, before: Path | None) -> Start | None:
 
     Args:
         training: the stage.
-        before: run directory of the stage before.
+        before: run directory of the stage before, or the policy that the first starts
+            from.
     """
     saved = checkpoint.checkpoints(training.path / "checkpoints")
     if not saved or not (training.path / CONFIG_FILE).exists():

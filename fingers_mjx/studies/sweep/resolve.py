@@ -1,10 +1,12 @@
 """From the file that a user writes to a sweep in which every default is resolved.
 
 The resolved sweep stands in `spec.yaml` of its directory, with explicit configurations
-in place of a search, and its hands beside it. It reads back to itself.
+in place of a search; beside it are its hands and the policy that it starts from. It
+reads back to itself.
 """
 
 import dataclasses
+import hashlib
 import json
 import os
 import subprocess
@@ -16,6 +18,7 @@ from envs.config.atomic_file import PARTIAL, write_atomic
 from envs.config.typed import dump_yaml, load_yaml, to_dict
 from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml, load_hand_file
+from fingers_deploy import load_bundle
 from fingers_deploy.errors import shortened
 from fingers_mjx.runs.directory import flat
 from fingers_mjx.studies.sweep.plan import check_sweep
@@ -23,35 +26,45 @@ from fingers_mjx.studies.sweep.promote import check_promotion
 from fingers_mjx.studies.sweep.search import Overrides, gridded, sampled
 from fingers_mjx.studies.sweep.spec import Sweep, free_names, seed_list
 
-SPEC_FILE, HANDS, LOCK_FILE = "spec.yaml", "hands", "sweep.lock"
+SPEC_FILE, HANDS, POLICIES = "spec.yaml", "hands", "policies"
+LOCK_FILE = "sweep.lock"
 BASE = "base"
 """Name of the configuration of a sweep that names none."""
 ADDABLE = ("configurations", "seeds")
 
 
-def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, str]]:
-    """Returns the sweep with its defaults, and the hand files that it names.
+def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, bytes]]:
+    """Returns the sweep with its defaults, and the files that it names.
 
     Args:
         spec: as read from `source`.
-        source: file of the specification; hands are named relative to it.
+        source: file of the specification; files are named relative to it.
         backend: physics backend of this machine.
 
     Returns:
-        The sweep and the hand files to be kept, by their names in it.
+        The sweep and the files to be kept, by their names in it.
 
     Raises:
         InputError: a hand file that cannot be read, or configurations by two ways with
             the same name.
+        BundleError: a damaged bundle.
     """
-    hands: dict[str, str] = {}
+    files: dict[str, bytes] = {}
 
     def kept(path: Any) -> str | None:
         if path is None:
             return None
         hand = load_hand_file(source.parent / path)
         name = f"{HANDS}/{hand.sha256[:12]}.yaml"
-        hands[name] = hand_yaml(hand)
+        files[name] = hand_yaml(hand).encode()
+        return name
+
+    def kept_policy(path: str | None) -> str | None:
+        if path is None:
+            return None
+        model = load_bundle(source.parent / path).model
+        name = f"{POLICIES}/{hashlib.sha256(model).hexdigest()[:12]}.onnx"
+        files[name] = model
         return name
 
     backend = spec.backend or backend
@@ -63,6 +76,7 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
         preset=spec.preset or ("fast" if backend == "warp" else "cpu"),
         hand=kept(spec.hand),
         backend=backend,
+        warm_start=kept_policy(spec.warm_start),
         configurations={
             name: {k: kept(v) if k == "hand" else v for k, v in settings.items()}
             for name, settings in _configurations(spec, source).items()
@@ -74,7 +88,7 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
         engine=engine,
         threads=spec.threads or (None if all_cores else 1),
     )
-    return made, hands
+    return made, files
 
 
 def machine_backend() -> str:
@@ -98,7 +112,7 @@ def saved_sweep(directory: Path) -> Sweep | None:
 
 
 def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
-    """Resolves a sweep, checks it, and writes it and its hands to its directory.
+    """Resolves a sweep, checks it, and writes it and its files to its directory.
 
     Args:
         written: as read from `source`.
@@ -111,14 +125,14 @@ def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
     """
     saved = saved_sweep(root)
     backend = written.backend or (saved.backend if saved else None)
-    spec, hands = resolved(written, source, backend or machine_backend())
+    spec, files = resolved(written, source, backend or machine_backend())
     if saved is None:
         _check_empty(root)
     else:
         check_only_added(saved, spec, source)
-    for name, text in hands.items():
+    for name, data in files.items():
         (root / name).parent.mkdir(exist_ok=True)
-        write_atomic(root / name, text)
+        write_atomic(root / name, data)
     check_sweep(spec, root, source)
     check_promotion(spec, source)
     write_atomic(root / SPEC_FILE, dump_yaml(spec))
@@ -127,7 +141,7 @@ def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
 
 def _check_empty(root: Path) -> None:
     """Refuses to begin a sweep among other files."""
-    ours = (LOCK_FILE, HANDS)
+    ours = (LOCK_FILE, HANDS, POLICIES)
     names = [p.name for p in root.iterdir() if not p.name.startswith(PARTIAL)]
     if others := sorted(set(names) - set(ours)):
         raise InputError(root, "", others[0], "a new or empty directory")

@@ -92,6 +92,8 @@ class Sweep:
         preset: base of all settings; by the machine if not given.
         hand: hand file, relative to the specification; the paper's hand if not given.
         backend: physics backend; by the machine if not given.
+        warm_start: bundle from which the first stage of every member starts, relative
+            to the specification; untrained networks if not given.
         set: settings of all members, by dotted name.
         configurations: name to its settings, among which `hand` may be; they count
             before those of a stage, and those before the ones of all members.
@@ -117,6 +119,7 @@ class Sweep:
     preset: str | None = None
     hand: str | None = None
     backend: str | None = None
+    warm_start: str | None = None
     set: Overrides = field(default_factory=dict)
     configurations: dict[str, Overrides] = field(default_factory=dict)
     search: Search | None = None

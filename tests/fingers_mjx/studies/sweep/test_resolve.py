@@ -2,13 +2,17 @@
 
 import dataclasses
 import shutil
+from pathlib import Path
 
 import pytest
 from support.sweep_setup import sweep
 
+import fingers_mjx
 from envs.config.typed import load_yaml
 from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
+from fingers_deploy import load_bundle
+from fingers_mjx.policy.place import is_bundle
 from fingers_mjx.studies.sweep.plan import Key, keys, trainings
 from fingers_mjx.studies.sweep.resolve import (
     SPEC_FILE,
@@ -19,6 +23,7 @@ from fingers_mjx.studies.sweep.resolve import (
 )
 from fingers_mjx.studies.sweep.spec import Sweep
 
+CRAWL = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 SEARCH = {"samples": 3, "space": {"ppo.clip": {"low": 0.1, "high": 0.3}}}
 
 
@@ -62,6 +67,22 @@ def test_hands_are_kept_beside_the_sweep(tmp_path, source):
     (training,) = trainings(spec, root, Key("mine", 0))
     assert training.setup.hand == load_hand_file(DEFAULT_HAND_FILE)
     assert keep_sweep(spec, root / SPEC_FILE, root) == spec
+
+
+def test_the_policy_that_members_start_from_is_kept(tmp_path, source):
+    shutil.copytree(CRAWL, tmp_path / "walker")
+    root = tmp_path / "sweep"
+    spec = kept(root, source, warm_start="walker")
+    shutil.rmtree(tmp_path / "walker")
+    assert spec.warm_start is not None
+    assert is_bundle(root / spec.warm_start)
+    assert load_bundle(root / spec.warm_start).model == load_bundle(CRAWL).model
+    assert keep_sweep(spec, root / SPEC_FILE, root) == spec
+
+
+def test_a_policy_that_is_missing_is_named(tmp_path, source):
+    with pytest.raises(InputError, match="walker: found No such file"):
+        kept(tmp_path / "sweep", source, warm_start="walker")
 
 
 def test_seeds_and_configurations_are_added(tmp_path, source):
