@@ -11,11 +11,17 @@ import sys
 from pathlib import Path
 
 from benchmarks.diagnosis.gallery import (
+    airbot,
     amd02,
+    cloud_pendulum,
+    dfki_double_pendulum,
     dfki_pendulum,
+    franka,
+    kr300,
     miuzei,
     rokae,
     sts3250,
+    tx40,
     ur10e,
 )
 from benchmarks.diagnosis.gallery.record import Record
@@ -26,8 +32,14 @@ from sysid.result import Diagnosis
 
 RECORDS = {
     module.RECORD.name: module.RECORD
-    for module in (amd02, dfki_pendulum, miuzei, rokae, sts3250, ur10e)
+    for module in (
+        *(amd02, dfki_pendulum, miuzei, rokae, sts3250, ur10e),
+        *(airbot, cloud_pendulum, dfki_double_pendulum, franka, kr300, tx40),
+    )
 }
+
+# A command without names must not spend the one look at the second half.
+FIRST = [name for name, record in RECORDS.items() if record.half == "first"]
 
 
 def answer(record: Record, said: Diagnosis) -> dict:
@@ -56,7 +68,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Diagnose public records.")
     parser.add_argument("--folder", type=Path, required=True, help="of the clones")
     parser.add_argument("--fetch", action="store_true", help="clone what is missing")
-    parser.add_argument("--only", nargs="+", default=list(RECORDS), metavar="NAME")
+    parser.add_argument("--only", nargs="+", default=FIRST, metavar="NAME")
     parser.add_argument("--out", type=Path, default=Path("gallery.jsonl"))
     args = parser.parse_args()
     rows = []
