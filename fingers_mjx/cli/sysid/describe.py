@@ -64,7 +64,7 @@ def _asked(proposals: Sequence[Proposal]) -> list[Proposal]:
     for made in proposals:
         for field in made.asked:
             prompt = f"{made.joint}: {QUESTIONS[field]}; Enter: {made.why[field]}: "
-            while text := input(prompt).strip():
+            while text := _line(prompt):
                 try:
                     made = answered(made, field, text)
                     break
@@ -72,3 +72,12 @@ def _asked(proposals: Sequence[Proposal]) -> list[Proposal]:
                     print(error)
         result.append(made)
     return result
+
+
+def _line(prompt: str) -> str:
+    """Returns what was typed, nothing at the end of the input (Ctrl-D)."""
+    try:
+        return input(prompt).strip()
+    except EOFError:
+        print()
+        return ""

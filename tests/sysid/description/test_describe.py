@@ -170,11 +170,13 @@ def test_the_text_is_a_drive_file(tmp_path):
     assert "slew_limit" in load_yaml(DriveFile, path).joints["servo"].effects
 
 
-def test_the_command_asks_on_a_terminal(tmp_path, monkeypatch, capsys):
+@pytest.mark.parametrize("rest", ["\n\nn\n", ""], ids=["answered", "ended"])
+def test_the_command_asks_on_a_terminal(tmp_path, monkeypatch, capsys, rest):
+    """An input that ends (Ctrl-D) keeps what is proposed, as an empty answer does."""
     log, mjcf = tmp_path / "knee.csv", tmp_path / "knee.xml"
     write_csv(record(tau=lambda nm: nm), log)
     mjcf.write_text(ARM.format(""))
-    typed = io.StringIO("zero\n11.5\n\n\nn\n")
+    typed = io.StringIO(f"zero\n11.5\n{rest}")
     typed.isatty = lambda: True
     monkeypatch.setattr("sys.stdin", typed)
     out = tmp_path / "drive.yaml"
