@@ -59,9 +59,7 @@ def _table(read: Read, name: str) -> Float[np.ndarray, "n 6"]:
 
 def _made(read: Read) -> Made:
     angles, torques = _table(read, "q"), _table(read, "tau")
-    columns = {}
-    for k, joint in enumerate(_JOINTS):
-        columns |= driven_columns(joint, angles[:, k], torques[:, k])
+    columns = driven_columns(_JOINTS, angles.T, torques.T)
     log = make_log(_JOINTS, _ROW_S * np.arange(len(angles)), columns, source=_MOTION)
     identified = ET.fromstring(read(f"{_FOLDER}/urdf/updated_robot.urdf"))
     urdf = _with_load(read(f"{_FOLDER}/urdf/airbot_play_v3_0_gripper.urdf"))

@@ -16,7 +16,7 @@ def _made(read: Read) -> Made:
     path = "results/real_uart_capture_collect_joint_3.npz"
     table = np.load(io.BytesIO(read(path)), allow_pickle=False)
     angle, torque = (table[name][:, _PLACE] for name in ("q", "tau_measured"))
-    columns = driven_columns(_JOINT, angle, torque)
+    columns = driven_columns((_JOINT,), [angle], [torque])
     log = make_log((_JOINT,), table["time"], columns, source=path)
     model = urdf_model(read("am_d02_model/urdf/AM-D02-AemLURDF0413.urdf"))
     return [log], model_mechanism(model, {_JOINT: DRIVEN})

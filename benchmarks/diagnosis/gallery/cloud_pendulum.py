@@ -29,10 +29,10 @@ _POINT = 1e-9 * np.eye(3)
 def _made(read: Read) -> Made:
     path = "data/sysid_exp_data_30s.csv"
     table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
-    columns, links = {}, {}
+    angles, torques = ([table[f"{x}_meas{k}"] for k in (1, 2)] for x in ("pos", "tau"))
+    columns = driven_columns(_JOINTS, angles, torques)
+    links = {}
     for k, (joint, (mass, arm)) in enumerate(zip(_JOINTS, _PARTS, strict=True)):
-        angle, torque = table[f"pos_meas{k + 1}"], table[f"tau_meas{k + 1}"]
-        columns |= driven_columns(joint, angle, torque)
         links[joint] = Link(
             shifted((0.0, 0.0, -k * _LENGTH_M)),
             mass,

@@ -30,9 +30,8 @@ _TIMES = (
 def _log(read: Read, time: str) -> MeasuredLog:
     path = f"{_FOLDER}/20230629-{time}/trajectory.csv"
     table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
-    columns = {}
-    for k, joint in enumerate(_JOINTS, 1):
-        columns |= driven_columns(joint, table[f"pos_meas{k}"], table[f"tau_meas{k}"])
+    angles, torques = ([table[f"{x}_meas{k}"] for k in (1, 2)] for x in ("pos", "tau"))
+    columns = driven_columns(_JOINTS, angles, torques)
     return make_log(_JOINTS, table["time"], columns, source=path)
 
 

@@ -18,7 +18,7 @@ def _made(read: Read) -> Made:
     for part in ("control_method_ddp", "control_method_direct_collocation"):
         path = f"results/{part}/data_measured.csv"
         table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
-        columns = driven_columns("pendulum", table["position"], table["torque"])
+        columns = driven_columns(("pendulum",), [table["position"]], [table["torque"]])
         logs.append(make_log(("pendulum",), table["time"], columns, source=path))
     model = pendulum_model("pendulum", {0.5: 0.546, 0.25: 0.13}, _ROTOR_KGM2)
     return logs, model_mechanism(model, {"pendulum": DRIVEN})

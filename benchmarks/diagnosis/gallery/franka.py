@@ -53,9 +53,7 @@ def _made(read: Read) -> Made:
         return np.array(read(f"{_LOG}_{name}.txt").split(), float)
 
     angles, torques = (table(x).reshape(-1, 7) for x in ("positions", "torques"))
-    columns = {}
-    for k, joint in enumerate(_JOINTS):
-        columns |= driven_columns(joint, angles[:, k], torques[:, k])
+    columns = driven_columns(_JOINTS, angles.T, torques.T)
     log = make_log(_JOINTS, table("time"), columns, source=_LOG)
     text = read("matlab/ConvertDynPars2VREP/DynPars2VREP.m").decode("latin-1")
     return [log], model_mechanism(_model(text), dict.fromkeys(_JOINTS, DRIVEN))

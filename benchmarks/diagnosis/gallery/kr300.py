@@ -97,9 +97,8 @@ def _log(read: Read, name: str) -> MeasuredLog:
     )["rec"]
     angles = np.deg2rad(found.act_pos_mot_deg) + _START_RAD[:, None]
     torques = found.act_torque_abs_nm * _RATIO[:, None]
-    columns = {"ext.axis2": _counterbalance_nm(angles[1])}
-    for k, axis in enumerate(_AXES):
-        columns |= driven_columns(axis, angles[k], torques[k])
+    columns = driven_columns(_AXES, angles, torques)
+    columns["ext.axis2"] = _counterbalance_nm(angles[1])
     return make_log(_AXES, found.time_cont, columns, source=path)
 
 

@@ -1,6 +1,7 @@
 """Nominal mechanisms of public records: URDF files without meshes, and pendulums."""
 
 import xml.etree.ElementTree as ET
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -54,20 +55,24 @@ def urdf_model(text: bytes, payload: str = "") -> Any:
 
 
 def driven_columns(
-    joint: str,
-    angle: Float[np.ndarray, " n"],
-    effort: Float[np.ndarray, " n"],
+    joints: Sequence[str],
+    angles: Sequence[Float[np.ndarray, " n"]] | Float[np.ndarray, "j n"],
+    efforts: Sequence[Float[np.ndarray, " n"]] | Float[np.ndarray, "j n"],
     quantity: str = "tau",
 ) -> dict[str, Float[np.ndarray, " n"]]:
-    """Columns of a joint that an effort drives: its target is its angle.
+    """Columns of joints that an effort drives: their targets are their angles.
 
     Args:
-        joint: its name.
-        angle: that was measured [rad].
-        effort: of its drive, in the unit of its quantity.
-        quantity: of the effort.
+        joints: their names.
+        angles: of each that were measured [rad].
+        efforts: of each one's drive, in the unit of their quantity.
+        quantity: of the efforts.
     """
-    return {f"cmd.{joint}": angle, f"pos.{joint}": angle, f"{quantity}.{joint}": effort}
+    columns = {}
+    for joint, angle, effort in zip(joints, angles, efforts, strict=True):
+        columns |= {f"cmd.{joint}": angle, f"pos.{joint}": angle}
+        columns[f"{quantity}.{joint}"] = effort
+    return columns
 
 
 def pendulum_model(name: str, parts: dict[float, float], armature: float = 0.0) -> Any:

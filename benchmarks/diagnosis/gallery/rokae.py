@@ -18,9 +18,8 @@ _BASE_QUAT_W = (0.5**0.5, 0.0, 0.5**0.5, 0.0)
 def _made(read: Read) -> Made:
     path = "src/config/dynamics_identification_data_real.csv"
     table = np.genfromtxt(io.BytesIO(read(path)), delimiter=",", names=True)
-    columns = {}
-    for k, joint in enumerate(_JOINTS):
-        columns |= driven_columns(joint, table[f"q{k}"], table[f"tau{k}"])
+    angles, torques = ([table[f"{x}{k}"] for k in range(7)] for x in ("q", "tau"))
+    columns = driven_columns(_JOINTS, angles, torques)
     log = make_log(
         _JOINTS, table["time"], columns, source=path, palm_quat_w=_BASE_QUAT_W
     )

@@ -51,9 +51,7 @@ def _made(read: Read) -> Made:
     """The file's currents are in N·m at the motors: the authors use them as torques."""
     angles = _table(read, "pos_read_data") @ np.linalg.inv(_RATIO).T + _START_RAD
     torques = _table(read, "curr_data") @ _RATIO
-    columns = {}
-    for k, joint in enumerate(_JOINTS):
-        columns |= driven_columns(joint, angles[:, k], torques[:, k])
+    columns = driven_columns(_JOINTS, angles.T, torques.T)
     log = make_log(_JOINTS, _ROW_S * np.arange(len(angles)), columns, source=_FOLDER)
     model = urdf_model(read(f"{_FOLDER}/urdf/tx40_mdh_modified.urdf"))
     drives = {j: _drive(rotor) for j, rotor in zip(_JOINTS, _ROTORS_KGM2, strict=True)}

@@ -11,6 +11,7 @@ import xml.etree.ElementTree as ET
 import numpy as np
 from jaxtyping import Float
 
+from benchmarks.diagnosis.gallery.chain import symmetric
 from benchmarks.diagnosis.gallery.models import driven_columns, urdf_model
 from benchmarks.diagnosis.gallery.record import Made, Read, Record
 from sysid.drive import JointDrive, Nominal
@@ -40,10 +41,9 @@ def _with_inertials(urdf: bytes, links: Float[np.ndarray, "6 10"]) -> bytes:
     robot = ET.fromstring(urdf)
     for name, row in zip(_LINKS, links, strict=True):
         mass, com = row[9], row[6:9] / row[9]
-        at_frame = np.zeros((3, 3))
-        at_frame[np.triu_indices(3)] = row[:6]
-        at_frame += np.triu(at_frame, 1).T
-        inertia = at_frame - mass * (com @ com * np.eye(3) - np.outer(com, com))
+        inertia = symmetric(row[:6]) - mass * (
+            com @ com * np.eye(3) - np.outer(com, com)
+        )
         inertial = robot.find(f"link[@name='{name}']/inertial")
         assert inertial is not None
         inertial.clear()
@@ -81,9 +81,7 @@ def _drives(text: str) -> dict[str, JointDrive]:
 def _made(read: Read) -> Made:
     path = "dataset_ur10e/identification_data/ur-20_02_19_14harm50secLoad.csv"
     table = np.loadtxt(io.BytesIO(read(path)), delimiter=",")[_USED]
-    columns = {}
-    for k, joint in enumerate(_JOINTS):
-        columns |= driven_columns(joint, table[:, 1 + k], table[:, 13 + k], "cur")
+    columns = driven_columns(_JOINTS, table.T[1:7], table.T[13:19], "cur")
     log = make_log(_JOINTS, table[:, 0] - table[0, 0], columns, source=path)
     text = read("UR10E_parameters.txt").decode()
     links = _identified(text, "pi_rgd").reshape(6, 10)

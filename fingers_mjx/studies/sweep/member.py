@@ -41,12 +41,12 @@ def train_members(
         InputError, Interrupted, OutOfSpace: as `fingers_mjx.training.train`.
     """
     stages = {key: trainings(spec, root, key) for key in keys}
+    begin = root / spec.warm_start if spec.warm_start else None
     lost: dict[Key, Exception] = {}
     for number in range(len(spec.stages)):
         fresh: dict[Key, Member] = {}
         resumed: dict[Key, Member] = {}
         for key in keys:
-            begin = root / spec.warm_start if spec.warm_start else None
             before = stages[key][number - 1].path if number else begin
             one = stages[key][number]
             if key in lost or (start := start_of(one, before)) is None:
