@@ -146,6 +146,7 @@ def bodies_along(
     f = _evaluated(model, ids, payload, motion, rows)
     hinge = (model.jnt_type[ids] == int(mujoco.mjtJoint.mjJNT_HINGE))[:, None]
     mass = model.body_subtreemass[body][:, None]
+    spin = np.einsum("njkl,njk->njl", f["inertial"], f["axis"]) ** 2
     turn = np.cross(f["axis"], f["com"] - f["anchor"])
     arm = np.where(hinge, np.cross(f["axis"], f["at"] - f["anchor"]), f["axis"])
     shift = np.cross(f["axis"][:, :, None], np.swapaxes(f["frame"], 2, 3))
@@ -154,7 +155,7 @@ def bodies_along(
         "turned": mass * np.where(hinge, np.cross(f["axis"], turn), 0.0),
         "payload_moment": arm,
         "payload_shift": np.where(hinge[..., None], shift, 0.0),
-        "payload_inertia": np.sum(arm**2, -1),
+        "payload_inertia": np.sum(arm**2 + hinge * spin * _shape(model, payload), -1),
         "matrix": f["m"],
         "rate": f["rate"],
     }
@@ -179,6 +180,14 @@ def _push(
     return inertia * motion.acc - np.einsum("nij,nj->ni", matrix, motion.acc) - rate
 
 
+def _shape(
+    model: mujoco.MjModel, bodies: Int[np.ndarray, " v"]
+) -> Float[np.ndarray, "v 3"]:
+    """Principal inertias of 1 kg that is spread as each body's own mass is [m²]."""
+    mass = model.body_mass[bodies][:, None]
+    return model.body_inertia[bodies] / np.where(mass > 0.0, mass, 1.0)
+
+
 def _payload_push(
     model: mujoco.MjModel,
     ids: list[int],
@@ -190,6 +199,7 @@ def _payload_push(
     pushes = np.zeros_like(motion.pos)
     for body in np.unique(payload) if len(ids) > 1 else ():
         heavier = copy.copy(model)
+        heavier.body_inertia[body] += _shape(model, np.array([body]))[0]
         heavier.body_mass[body] += 1.0
         found = _evaluated(heavier, ids, payload, motion, rows)
         fine = [interpolated(rows, found[k], len(motion.pos)) for k in ("m", "rate")]
@@ -210,7 +220,7 @@ def _evaluated(
     adr, dof = model.jnt_qposadr[ids], model.jnt_dofadr[ids]
     matrix = np.zeros((model.nv, model.nv))
     found: dict[str, list] = {
-        k: [] for k in ("m", "axis", "anchor", "com", "at", "frame", "rate")
+        k: [] for k in ("m", "axis", "anchor", "com", "at", "frame", "inertial", "rate")
     }
     for k in rows:
         data.qpos[adr], data.qvel[dof] = motion.pos[k], motion.vel[k]
@@ -224,6 +234,7 @@ def _evaluated(
         found["com"].append(data.subtree_com[model.jnt_bodyid[ids]])
         found["at"].append(data.xipos[payload])
         found["frame"].append(data.xmat[payload].reshape(-1, 3, 3))
+        found["inertial"].append(data.ximat[payload].reshape(-1, 3, 3))
         found["rate"].append(
             _coriolis(model, data)[dof] if len(dof) > 1 else np.zeros(1)
         )

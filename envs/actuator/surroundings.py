@@ -21,7 +21,8 @@ class Gravity:
         payload_moment: m of a payload of 1 kg [m].
         payload_shift: change of `payload_moment` by a shift of the payload along the
             x, y and z of the body that carries it [m/m]: rows a × e_k.
-        payload_inertia: inertia about the joint of a payload of 1 kg [m²].
+        payload_inertia: inertia about the joint of a payload of 1 kg that is spread as
+            the nominal one is [m²].
         payload_push: torque on the joint by a payload of 1 kg that the motion of the
             other joints accelerates [m²/s²].
     """

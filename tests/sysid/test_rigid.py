@@ -68,12 +68,15 @@ ARM = """
 <joint name="a" axis="0 1 0"/>
 <inertial pos="0 0 -0.1" mass="0.4" diaginertia="1e-3 1e-3 1e-3"/>
 <body pos="0 0 -0.25"><joint name="b" axis="0.6 0.8 0"/>
-<inertial pos="0 0.02 -0.12" mass="{mass}" diaginertia="1e-3 1e-3 1e-3"/>
+<inertial pos="0 0.02 -0.12" mass="{mass}" quat="0.9 0.1 0.4 0.2"
+ diaginertia="{x} {y} {z}"/>
 </body></body></worldbody></mujoco>"""
 
 
 def arm(mass):
-    return mujoco.MjModel.from_xml_string(ARM.format(mass=mass))
+    """Two links, the second of which is heavier but has the same shape."""
+    x, y, z = mass / 0.3 * np.array([4e-3, 3e-3, 2e-3])
+    return mujoco.MjModel.from_xml_string(ARM.format(mass=mass, x=x, y=y, z=z))
 
 
 def test_a_payload_weighs_turns_and_is_pushed_as_inverse_dynamics_says():

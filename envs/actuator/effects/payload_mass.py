@@ -33,8 +33,9 @@ def _change(params: Params, scene, fields):
 
 EFFECT = EffectKind(
     name="payload_mass",
-    equation="m = m₀ + Δm: Δτ = Δm (a × r) · (g − r̈ₒ), ΔI = Δm |a × r|², with the "
-    "acceleration r̈ₒ by the other joints",
+    equation="m = m₀ + Δm, spread as m₀ is: Δτ = Δm ((a × r) · (g − r̈ₒ) − a · J ω̇ₒ), "
+    "ΔI = Δm (|a × r|² + a · J a), with J = I₀ / m₀ and the accelerations r̈ₒ and ω̇ₒ by "
+    "the other joints",
     parameters={
         "mass_kg": Parameter("kg", -0.07, 1.0, normal(0.0, 0.02), identity=0.0)
     },
