@@ -10,7 +10,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from benchmarks.diagnosis.gallery import (
+from benchmarks.diagnosis.gallery.record import Record
+from benchmarks.diagnosis.gallery.records import (
     airbot,
     amd02,
     cloud_pendulum,
@@ -24,7 +25,6 @@ from benchmarks.diagnosis.gallery import (
     tx40,
     ur10e,
 )
-from benchmarks.diagnosis.gallery.record import Record
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError, one_of
 from sysid.diagnosis.diagnose import diagnose
