@@ -13,6 +13,8 @@ Effort = Literal["tau", "cur", "duty", "none"]
 Part = Literal["both", "controller", "mechanics"]
 UNIVERSAL = ("1", "s", "Hz", "1e-6")
 """Units of parameters whose bounds hold for a robot of any size."""
+_TOLERANCE = {"low": 0.0, "high": 10.0}
+"""Range of every tolerance [1]."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +29,20 @@ class Nominal:
     """
 
     value: float
-    tolerance: float = field(default=0.05, metadata={"low": 0.0, "high": 10.0})
+    tolerance: float = field(default=0.05, metadata=_TOLERANCE)
     free: bool = False
+
+
+@dataclass(frozen=True)
+class Masses:
+    """How well the masses of the MJCF file are known; their values stand there.
+
+    Attributes:
+        tolerance: largest relative deviation within the expected, of the masses and
+            inertias that a joint moves, of its rotor and of the carrying body.
+    """
+
+    tolerance: float = field(default=0.05, metadata=_TOLERANCE)
 
 
 @dataclass(frozen=True)
@@ -45,6 +59,7 @@ class JointDrive:
         effects: effects that the simulation has, with their parameters by name.
         known: `controller` where unknown forces push on the joint, `mechanics` where
             the law of the controller is not known: only that part is examined then.
+        masses: how well those that the joint moves are known.
     """
 
     kp: Nominal
@@ -54,6 +69,7 @@ class JointDrive:
     effort_scale: Nominal = field(default_factory=lambda: Nominal(1.0, 0.02))
     effects: dict[str, dict[str, Nominal]] = field(default_factory=dict)
     known: Part = "both"
+    masses: Masses = field(default_factory=Masses)
 
     def __post_init__(self) -> None:
         for name, parameters in self.effects.items():

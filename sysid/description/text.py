@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from sysid.description.proposal import QUESTIONS, Proposal
-from sysid.drive import SCHEMA, Nominal
+from sysid.drive import SCHEMA, Masses, Nominal
 
 
 def drive_text(proposals: Sequence[Proposal], source: str) -> str:
@@ -15,7 +15,9 @@ def drive_text(proposals: Sequence[Proposal], source: str) -> str:
     """
     lines = [
         f"# Proposed from {source}. Gains that were read off the record are free:",
-        "# put in what is known of the robot, with a tolerance of its own.",
+        "# put in what is known of the robot, with a tolerance of its own. No record",
+        "# says how well the masses of the MJCF file are known: where a joint has no",
+        f"# `masses: {{tolerance: …}}`, {Masses().tolerance:.0%} are expected.",
         f"schema: {SCHEMA}",
         "joints:",
     ]

@@ -8,7 +8,7 @@ from benchmarks.diagnosis.hidden.cases import Case
 from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
 from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
 from benchmarks.diagnosis.hidden.truth import Joint
-from sysid.drive import Effort, JointDrive, Nominal
+from sysid.drive import Effort, JointDrive, Masses, Nominal
 from sysid.mechanism import Mechanism, model_mechanism
 
 
@@ -36,6 +36,7 @@ def _drive(joint: Joint, stand: Stand, effort: Effort) -> JointDrive:
         kp=Nominal(joint.kp, known["kp"], free=stand.gains_free),
         kd=Nominal(joint.kd, known["kd"], free=stand.gains_free),
         effort=effort,
+        masses=Masses(known["mass"]),
         effects={
             name: {key: Nominal(v, _known(known, t)) for key, (v, t) in values.items()}
             for name, values in path.items()

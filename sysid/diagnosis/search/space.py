@@ -29,9 +29,6 @@ millisecond [s]."""
 DELAY_S = 1e-3
 """Least tolerance of a known delay [s]."""
 
-MASS = 0.05
-"""Relative tolerance of masses and inertias."""
-
 ZERO_RAD = 1e-3
 """Tolerance of an encoder's zero where none is given [rad]."""
 
@@ -84,7 +81,7 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
     rotor = 0.5 * track.armature if track.armature > 0.0 else 0.1 * inertia
     slots = [
         _nuisance("effort_gain", "1", "log", 1.0, effort),
-        _nuisance("mass", "1", "log", 1.0, MASS),
+        _nuisance("mass", "1", "log", 1.0, drive.masses.tolerance),
         _nuisance("skew_s", "s", "linear", 1e-3, SKEW_S / 1e-3),
         _nuisance("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
         _nuisance("rotor", "kg·m²", "log", rotor, ROTOR),
@@ -110,14 +107,15 @@ def _nominal(drive: JointDrive, effect: str, track: JointTrack) -> dict[str, Nom
         return {"scale": replace(drive.kp, value=1.0)}
     if effect == "damping":
         return {"scale": replace(drive.kd, value=1.0)}
-    found = drive.effects.get(effect, {})
+    found, masses = drive.effects.get(effect, {}), drive.masses.tolerance
     if effect == "armature" and not found:
         # Masses scale all of it; drive and links may be wrong in opposite ways.
         known = math.sqrt(2.0) * track.armature
         inertia = known or float(np.mean(np.asarray(track.track.inertia)))
-        return {"inertia_kgm2": Nominal(0.0, MASS * inertia)}
+        return {"inertia_kgm2": Nominal(0.0, masses * inertia)}
     if effect == "payload_mass" and not found:
-        return {"mass_kg": Nominal(0.0, MASS * float(np.mean(track.track.payload_kg)))}
+        carried = float(np.mean(track.track.payload_kg))
+        return {"mass_kg": Nominal(0.0, masses * carried)}
     if effect == "encoder_offset" and not found and not track.slide:
         return {"offset_rad": Nominal(0.0, ZERO_RAD)}
     return found

@@ -165,6 +165,7 @@ def test_the_text_is_a_drive_file(tmp_path):
     path = tmp_path / "drive.yaml"
     path.write_text(drive_text([found], "knee.csv"), encoding="utf-8")
     assert load_yaml(DriveFile, path).joints == {"servo": found.drive}
+    assert "# `masses: {tolerance: …}`, 5% are expected." in path.read_text("utf-8")
     taken = path.read_text().replace("# effects", "effects").replace("#   ", "  ")
     path.write_text(taken)
     assert "slew_limit" in load_yaml(DriveFile, path).joints["servo"].effects

@@ -103,6 +103,22 @@ def test_command_line(tmp_path, capsys):
         assert not (tmp_path / "o").exists()
 
 
+def test_masses_that_are_no_share(tmp_path, capsys):
+    """Exit status 2 and one line: per cent in the place of a share."""
+    (tmp_path / "arm.xml").write_text(ARM)
+    drive, log = tmp_path / "drive.yaml", tmp_path / "arm.csv"
+    drive.write_text(DRIVE.replace("effort", "masses: {tolerance: 50}, effort"))
+    write_log(log_of(), log)
+    words = ["sysid", "diagnose", str(log), "-o", str(tmp_path / "o")]
+    assert (
+        main([*words, "--mjcf", str(tmp_path / "arm.xml"), "--drive", str(drive)]) == 2
+    )
+    printed = capsys.readouterr()
+    assert printed.err.count("\n") == 1
+    said = "drive.yaml: joints.*.masses.tolerance: found 50.0; valid: a finite number"
+    assert f"{said} >= 0 <= 10" in printed.err
+
+
 def test_milliseconds():
     log = log_of()
     slow = make_log(log.header.joints, 1e3 * T, log.columns, source="arm.csv")
