@@ -7,7 +7,9 @@ Three variances of a coordinate count, the larger of the first two and the third
     unmodelled    what a servo's own cycle does to parameters of its command path; what
                   a grid's size may change by without another target on it; that a
                   spring is identified by a resonance whose damping ratio is only
-                  assumed, and play by flights between walls of assumed restitution 0
+                  assumed, and play by flights between walls of assumed restitution 0;
+                  that a load is what a body weighs beyond a nominal mass, which has a
+                  tolerance of its own beside that of all masses together
 
 The second is larger than the first where blocks of a record contradict each other, as
 they do where the model is not exact or its errors are correlated.
@@ -88,6 +90,8 @@ def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:
         return DAMPING * (u if slot.kind == "linear" else 1.0)
     if slot.effect == "backlash":
         return BOUNCE * abs(u)
+    if slot.effect == "payload_mass" and slot.nominal == 0.0:
+        return slot.prior_sd
     return _timing(slot, data)
 
 

@@ -3,7 +3,9 @@
 A load hangs on one body and a mount is turned once, whichever joints show it. Every
 joint is searched for itself, and the quadratic of its posterior around its optimum is
 its estimate with its standard error; the sum of those quadratics over the joints that
-share the body is least at the mean weighted by inverse variances.
+share the body is least at the mean weighted by inverse variances. What joints of one
+record err by they share (its clock, nominal masses, gravity), so the mean is not
+surer than the surest of them.
 """
 
 from collections.abc import Sequence
@@ -49,20 +51,24 @@ def sharing(
 def combined(
     each: Sequence[dict[str, Estimate]], half_width: float
 ) -> dict[str, Estimate]:
-    """x̄ = Σ w_j x_j / Σ w_j with w = 1 / σ², σ̄² = 1 / Σ w_j, for every parameter.
+    """x̄ = Σ w_j x_j / Σ w_j with w = 1 / σ², σ̄ = min_j σ_j, for every parameter.
 
     Args:
         each: estimates of every joint.
         half_width: of their intervals, and of the one that is returned [σ].
 
     Source:
-        Textbook: product of Gaussian densities of one size.
+        Mean of a product of Gaussian densities of one size; its error is ours, for
+        errors that are not independent.
     """
     result = {}
     for name, one in each[0].items():
         value, sigma = _sizes([e[name] for e in each], half_width)
         total = np.sum(sigma**-2.0)
-        mean, half = float(value @ sigma**-2.0 / total), half_width / np.sqrt(total)
+        mean, half = (
+            float(value @ sigma**-2.0 / total),
+            half_width * float(np.min(sigma)),
+        )
         result[name] = Estimate(mean, float(mean - half), float(mean + half), one.unit)
     return result
 

@@ -49,3 +49,17 @@ def test_a_payload_of_kilograms_is_found():
     assert said.causes[0].effect == "payload_mass"
     found = said.causes[0].parameters["mass_kg"]
     assert found.value == pytest.approx(added, rel=0.1)
+    # A load is what the body weighs beyond a mass that is known to 5 %.
+    body = case.stand.mechanism.links[-1].mass
+    assert found.low < added < found.high
+    assert found.high - found.low > 2 * 2.5 * 0.05 / np.sqrt(3.0) * body
+
+
+def test_the_load_of_an_arm_is_no_coupling():
+    """The shoulder feels that it turns: a point would look like the elbow's pull."""
+    arm = Conditions(rig="arm", rate_hz=100.0, lowpass_hz=15.0)
+    case = drawn_case(11, ("payload_mass",), "strong", arm)
+    said = diagnose(list(case.logs), believed(case.stand))
+    assert [cause.effect for cause in said.causes] == ["payload_mass"]
+    found = said.causes[0].parameters["mass_kg"]
+    assert found.low < true_parameters(case, "payload_mass")["mass_kg"] < found.high
