@@ -28,7 +28,7 @@ def add(commands) -> None:
     options.seed(parser)
     length, gain = options.number(4.0), options.number(0.0)
     options.value(parser, "--seconds", length, 10.0, "length of an episode [s]")
-    options.value(parser, "--gain", gain, 1.0, "yaw rate per heading error [1/s]")
+    options.value(parser, "--gain", gain, 4.0, "yaw rate per heading error [1/s]")
     drift = "constant yaw rate of the controller [rad/s]"
     options.value(parser, "--offset", options.number(), 0.0, drift)
     options.backend(parser)

@@ -189,6 +189,18 @@ def test_heading_hold_removes_a_drift_that_its_offset_knows(drift):
     assert abs(psi) < 0.01
 
 
+@pytest.mark.parametrize(("gain", "beside_deg"), [(1.0, 5.7), (4.0, 1.4)])
+def test_heading_hold_comes_to_rest_beside_its_heading(gain, beside_deg):
+    """By drift / gain, also of a hand that turns 0.2 s later than it is asked to."""
+    config = HeadingConfig(gain, 0.0, -0.45, 0.45)
+    psi, turning = 0.5, 0.0
+    for _ in range(500):
+        _, rate = heading_step(0.0, psi, 0.0, config)
+        turning += DT / 0.2 * (rate + 0.1 - turning)
+        psi += turning * DT
+    assert np.rad2deg(psi) == pytest.approx(beside_deg, abs=0.1)
+
+
 def test_upright_needs_half_a_second_of_level_and_calm():
     since, times = np.inf, []
     for k in range(100):
