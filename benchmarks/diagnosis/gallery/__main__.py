@@ -38,9 +38,6 @@ RECORDS = {
     )
 }
 
-# A command without names must not spend the one look at the second half.
-FIRST = [name for name, record in RECORDS.items() if record.half == "first"]
-
 
 def answer(record: Record, said: Diagnosis) -> dict:
     """Compares a diagnosis with what the authors say.
@@ -68,7 +65,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description="Diagnose public records.")
     parser.add_argument("--folder", type=Path, required=True, help="of the clones")
     parser.add_argument("--fetch", action="store_true", help="clone what is missing")
-    parser.add_argument("--only", nargs="+", default=FIRST, metavar="NAME")
+    parser.add_argument("--only", nargs="+", default=list(RECORDS), metavar="NAME")
     parser.add_argument("--out", type=Path, default=Path("gallery.jsonl"))
     args = parser.parse_args()
     rows = []

@@ -33,7 +33,7 @@ class Calibration:
     Attributes:
         temper: λ, weight of the share that a set explains.
         effect_cost: c, prior odds against each effect.
-        named: δ, what a set gains that the verdict names.
+        named: δ, by how much they are less where the verdict names the set.
         left, clean: odds of none of these where something remains unexplained, and
             where nothing does.
     """
@@ -45,7 +45,7 @@ class Calibration:
     clean: float
 
 
-CALIBRATION = Calibration(0.58, 3.52, 2.5, 0.41, -4.67)
+CALIBRATION = Calibration(0.63, 5.32, 3.48, 0.0, -4.65)
 """Fitted by `benchmarks.diagnosis.calibration` to 124 joints of battery seed 6007."""
 
 
@@ -58,7 +58,7 @@ def posterior(
     """Probabilities of sets of effects S, and of none of them.
 
         P(S) = (1 − P₀) w(S) / Σ w,   P₀ = 1 / (1 + e^{−o})
-        log w(S) = λ (g / G) ln(1 + G) − c |S| + δ [S named]
+        log w(S) = λ (g / G) ln(1 + G) − (c − δ [S named]) |S|
 
     with the gain g = ℓ(S) − ℓ(∅) and its largest value G > 0: shares of what can be
     explained decide, and the more of it there is the less by its amount.
@@ -87,9 +87,9 @@ def posterior(
     gain = np.array(list(log_likelihoods.values())) - log_likelihoods[()]
     most = max(float(gain.max()), LEAST_GAIN)
     weight = by.temper * gain / most * math.log1p(most)
-    weight -= by.effect_cost * np.array([len(s) for s in sets])
-    extra = by.named * np.array([s in named for s in sets])
-    weight = np.exp(weight + extra - np.max(weight + extra))
+    cost = by.effect_cost - by.named * np.array([s in named for s in sets])
+    weight -= cost * np.array([len(s) for s in sets])
+    weight = np.exp(weight - np.max(weight))
     none_of_these = 1.0 / (1.0 + math.exp(-(by.left if left else by.clean)))
     share = (1.0 - none_of_these) * weight / weight.sum()
     return {**dict(zip(sets, share.tolist(), strict=True)), None: none_of_these}

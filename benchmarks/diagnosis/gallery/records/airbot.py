@@ -79,4 +79,10 @@ RECORD = Record(
     "have",
     where="examples/airbot_play/config/airbot_play_config.yaml, `tls_params`",
     made=_made,
+    remark="Right: the load is the first cause, but in a crowd. The sizes in joints "
+    "1, 2, 4 and 5 are 0.3 to 0.8 kg and do not agree, so that it is reported in each"
+    " of them, and ten causes that nobody documents stand beside it (tilts, "
+    "couplings, rotors): the masses of the CAD file are 50 % low in joints 4 and 5 "
+    "also without the load, and 5 % is what the diagnosis allows where `masses` says "
+    "nothing else.",
 )

@@ -72,4 +72,8 @@ RECORD = Record(
     where="matlab/dyn_model_panda/get_FrictionTorque.m; IEEE Robotics and Automation "
     "Letters 4(4), 2019",
     made=_made,
+    remark="Right: Coulomb friction in joints 6 and 7, 0.16 (0.13 to 0.19) and 0.27 "
+    "N·m (0.21 to 0.33), where the authors have 0.15 and 0.28. In joints 4 and 5 dry "
+    "friction of about their size (0.56 and 0.34 N·m, theirs are 0.64 and 0.42) is "
+    "called hysteresis, in joint 2 an asymmetry; in joints 1 and 3 it is not named.",
 )
