@@ -84,5 +84,6 @@ RECORD = Record(
     " of them, and ten causes that nobody documents stand beside it (tilts, "
     "couplings, rotors): the masses of the CAD file are 50 % low in joints 4 and 5 "
     "also without the load, and 5 % is what the diagnosis allows where `masses` says "
-    "nothing else.",
+    "nothing else. With half allowed the load hides in them, and couplings and tilts "
+    "remain.",
 )
