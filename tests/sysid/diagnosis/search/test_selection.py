@@ -1,0 +1,82 @@
+"""What an effect must gain, and when a search runs again, with models written here."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid.diagnosis.search import search as searching
+from sysid.diagnosis.search import selection
+from sysid.diagnosis.search.parameters import Slot, Space
+from sysid.diagnosis.search.search import STRAINED, search
+from sysid.diagnosis.search.selection import accepted
+
+SHARE = Slot("load_friction", "drive_share", "1", "linear", 1.0, 0.0, 0.0, 0.8, 0.0,
+             (), True)  # fmt: skip
+LEAVES = 100.0
+
+
+def friction_accepted(monkeypatch, share, leaves, repeat):
+    """Whether a share of the torque is taken that leaves so much of `LEAVES`."""
+    monkeypatch.setattr(selection, "log_likelihood_gain", lambda *_: 1e4)
+    problem = SimpleNamespace(
+        space=Space((SHARE,)),
+        samples=200,
+        repeat=repeat,
+        data=SimpleNamespace(effort=np.array([True])),
+        channel_counts=lambda: np.array([100, 100]),
+    )
+    nothing = SimpleNamespace(effects=(), errors=np.array([1.0, LEAVES]), penalty=0.0)
+    friction = SimpleNamespace(
+        effects=("load_friction",),
+        errors=np.array([1.0, leaves]),
+        penalty=0.0,
+        fit=SimpleNamespace(theta=np.array([share])),
+    )
+    return accepted(problem, nothing, friction, nothing)
+
+
+@pytest.mark.parametrize("share", [0.3, 0.8])
+def test_friction_that_only_scales_what_is_left_is_no_cause(monkeypatch, share):
+    """A share K of the torque leaves (1 − K)² of any error, whatever it lacks."""
+    trivial = LEAVES * (1.0 - share) ** 2
+    assert not friction_accepted(monkeypatch, share, 1.01 * trivial, repeat=False)
+    assert friction_accepted(monkeypatch, share, 0.99 * trivial, repeat=False)
+
+
+def test_repeats_say_what_is_noise_and_friction_need_not(monkeypatch):
+    assert friction_accepted(monkeypatch, 0.8, LEAVES * 0.05, repeat=True)
+
+
+@pytest.mark.parametrize(
+    ("penalty", "effects", "repeat", "runs"),
+    [
+        (0.9 * STRAINED, (), False, 1),
+        (1.1 * STRAINED, (), False, 2),
+        (0.0, ("backlash",), False, 2),
+        (1.1 * STRAINED, ("backlash",), True, 1),
+    ],
+)
+def test_a_search_runs_again_where_tolerances_are_strained(
+    monkeypatch, penalty, effects, repeat, runs
+):
+    """Without repeats, with what the first run left as noise."""
+    fit = SimpleNamespace(theta=np.zeros(1))
+    base = SimpleNamespace(penalty=penalty, fit=fit)
+    found = SimpleNamespace(best=SimpleNamespace(effects=effects, fit=fit))
+    problem = SimpleNamespace(repeat=repeat, raw=lambda theta: [np.full(2, 3.0)])
+    problem.with_remaining = lambda left: SimpleNamespace(left=left)
+    seen = []
+
+    def searched(problem, base):
+        seen.append(problem)
+        return found
+
+    monkeypatch.setattr(searching, "settled", lambda p: (p, base))
+    monkeypatch.setattr(searching, "coupled", lambda p, b: p)
+    monkeypatch.setattr(searching, "output_problem", lambda p: None)
+    monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
+    monkeypatch.setattr(searching, "_searched", searched)
+    assert search(problem) is found
+    assert len(seen) == runs
+    assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
