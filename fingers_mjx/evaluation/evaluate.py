@@ -104,6 +104,30 @@ def evaluate(
         measuring: what is measured.
         progress: called with (steps done, steps in all) from time to time.
     """
+    traces = run_episodes(env, policy, episodes, progress)
+    return episode_table(traces, float(env.dt), measuring)
+
+
+def run_episodes(
+    env: VectorEnv,
+    policy: Policy,
+    episodes: Episodes,
+    progress: Progress | None = None,
+) -> Trace:
+    """Returns the traces of as many episodes, for `episode_table`.
+
+    Args:
+        env: as in `evaluate`, as the rest.
+        policy: from batched observations to batched actions.
+        episodes: which ones.
+        progress: called with (steps done, steps in all) from time to time.
+
+    Returns:
+        NumPy arrays, axes time and episode first.
+
+    Source:
+        Ours.
+    """
     number, steps = episodes.number, episodes.steps
     stretch = min(REPORT_EVERY, steps)
     # In one program: on a GPU single steps would wait for their launch, each anew.
@@ -116,8 +140,7 @@ def evaluate(
             progress, count // worlds * steps, -(-number // worlds) * steps
         )
         rollouts.append(_rollout(partial(advance, policy), state, steps, report))
-    traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
-    return episode_table(traces, float(env.dt), measuring)
+    return jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
 
 
 def episode_table(traces: Trace, dt_s: float, measuring: Measuring) -> EpisodeTable:

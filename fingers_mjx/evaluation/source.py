@@ -131,12 +131,23 @@ def evaluate_source(
         measuring(batch),
         progress,
     )
-    _check_room(table, setup.env)
+    check_room(table, setup.env)
     return table
 
 
-def _check_room(table: EpisodeTable, config: Any) -> None:
-    """Raises InputError if something was dropped in a step that counts."""
+def check_room(table: EpisodeTable, config: Any) -> None:
+    """Checks that there was space for all contacts.
+
+    Args:
+        table: of an evaluation.
+        config: settings of its task.
+
+    Raises:
+        InputError: something was dropped in a step that counts.
+
+    Source:
+        Ours.
+    """
     episodes = [table.episode(index) for index in range(table.traces.done.shape[1])]
     hit = np.array([one.overflow.any(axis=0) for one in episodes])
     for metric, count in zip(ROOM, hit.sum(axis=0), strict=True):

@@ -5,12 +5,16 @@ import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from envs.errors import InputError
 from fingers_mjx.evaluation import source as evaluating
+from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.together import evaluate_together
 from fingers_mjx.policy.interface import identity
-from fingers_mjx.policy.source import load_source
+from fingers_mjx.policy.source import PolicySource, load_source
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import CONFIG_FILE
 from fingers_mjx.runs.setup import make_env, overridden
+from fingers_mjx.studies.sweep.engines.population import most_worlds, shared
 from fingers_mjx.studies.sweep.outcome import is_evaluated
 from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
 from fingers_mjx.studies.sweep.spec import Evaluation, Sweep
@@ -94,47 +98,97 @@ def start_of(training: Training, before: Path | None) -> Start | None:
     return Start(resume=True)
 
 
-def evaluate_member(spec: Sweep, root: Path, key: Key) -> None:
-    """Evaluates the last stage of a member, unless that has been done.
+def evaluate_members(
+    spec: Sweep, root: Path, keys: Sequence[Key]
+) -> dict[Key, Exception]:
+    """Evaluates the last stage of members as far as that has not been done.
 
-    Raises:
-        InputError: as `evaluate_run`.
-    """
-    last = trainings(spec, root, key)[-1]
-    if not is_evaluated(last.path):
-        evaluate_run(last.path, spec.evaluate, last.setup.train.hang_limit_s)
-
-
-def evaluate_run(run: Path, wanted: Evaluation, hang_limit_s: float) -> None:
-    """Evaluates a trained run into its directory, as `fingers eval` does.
+    Members that share a program are evaluated in one, as many as a GPU has room for.
 
     Args:
-        run: run directory.
-        wanted: episodes, seed, backend and settings.
-        hang_limit_s: as in training; a process that hangs is ended.
+        spec: resolved.
+        root: directory of the sweep.
+        keys: members that are trained.
+
+    Returns:
+        Members that could not be evaluated, while the others were.
 
     Raises:
-        InputError: settings that do not fit, or no space for the contacts.
+        InputError: settings that do not fit.
+
+    Source:
+        Ours.
     """
-    loaded = load_source(run)
+    last = {key: trainings(spec, root, key)[-1] for key in keys}
+    waiting = {k: v for k, v in last.items() if not is_evaluated(v.path)}
+    most = max(1, most_worlds(spec) // spec.evaluate.episodes)
+    groups: dict[str, list[Key]] = {}
+    for key, one in waiting.items():
+        groups.setdefault(shared([one]), []).append(key)
+    lost: dict[Key, Exception] = {}
+    for group in groups.values():
+        for first in range(0, len(group), most):
+            some = {key: waiting[key] for key in group[first : first + most]}
+            lost |= _evaluate(some, spec.evaluate)
+    return lost
+
+
+def _evaluate(
+    group: Mapping[Key, Training], wanted: Evaluation
+) -> dict[Key, Exception]:
+    """Evaluates trained runs into their directories, as `fingers eval` does."""
     settings = assignments(wanted.set)
+    sources: dict[Key, PolicySource] = {}
+    lost: dict[Key, Exception] = {}
+    for key, one in group.items():
+        try:
+            sources[key] = _as_evaluated(one.path, settings)
+        except InputError as error:
+            lost[key] = error
+    tables = _tables(list(sources.values()), next(iter(group.values())), wanted)
+    for (key, source), table in zip(sources.items(), tables, strict=True):
+        try:
+            evaluating.check_room(table, source.setup.env)
+        except InputError as error:
+            lost[key] = error
+            continue
+        conditions = {
+            "backend": wanted.backend or source.setup.train.backend,
+            "steps": None,
+            "command": None,
+            "nominal": False,
+            "settings": settings,
+        }
+        about = evaluating.document(source, table, wanted.seed, conditions)
+        evaluating.write_evaluation(group[key].path / "eval", table, about)
+    return lost
+
+
+def _as_evaluated(run: Path, settings: Sequence[str]) -> PolicySource:
+    """Returns the policy of a run with the settings of its evaluation."""
+    loaded = load_source(run)
     setup = overridden(evaluating.as_deployed(loaded.setup), settings)
-    source = dataclasses.replace(loaded, setup=setup)
-    backend = wanted.backend or setup.train.backend
-    with Watchdog(run / HANG_FILE, hang_limit_s) as watchdog:
-        table = evaluating.evaluate_source(
-            source,
-            wanted.episodes,
-            wanted.seed,
-            backend,
-            progress=lambda done, total: watchdog.beat(),
-        )
-    conditions = {
-        "backend": backend,
-        "steps": None,
-        "command": None,
-        "nominal": False,
-        "settings": settings,
-    }
-    about = evaluating.document(source, table, wanted.seed, conditions)
-    evaluating.write_evaluation(run / "eval", table, about)
+    return dataclasses.replace(loaded, setup=setup)
+
+
+def _tables(
+    sources: Sequence[PolicySource], first: Training, wanted: Evaluation
+) -> list[EpisodeTable]:
+    """Runs the episodes of all policies; a process that hangs is ended."""
+    backend = wanted.backend or first.setup.train.backend
+    limit_s = first.setup.train.hang_limit_s
+    with Watchdog(first.path / HANG_FILE, limit_s) as watchdog:
+
+        def beat(done: int, total: int) -> None:
+            watchdog.beat()
+
+        if len(sources) > 1:
+            return evaluate_together(
+                sources, wanted.episodes, wanted.seed, backend, progress=beat
+            )
+        return [
+            evaluating.evaluate_source(
+                one, wanted.episodes, wanted.seed, backend, progress=beat
+            )
+            for one in sources
+        ]

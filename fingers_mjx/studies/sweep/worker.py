@@ -18,7 +18,7 @@ from pathlib import Path
 
 from envs.errors import InputError
 from fingers_mjx.runs.directory import locked
-from fingers_mjx.studies.sweep.member import evaluate_member, train_members
+from fingers_mjx.studies.sweep.member import evaluate_members, train_members
 from fingers_mjx.studies.sweep.outcome import CRASHED, forget_outcome, note_outcome
 from fingers_mjx.studies.sweep.plan import Key
 from fingers_mjx.studies.sweep.resolve import SPEC_FILE, saved_sweep
@@ -31,20 +31,20 @@ LOCK_WAIT_S = 30.0
 """Time in which a worker whose sweep was killed has ended [s]."""
 
 TrainMembers = Callable[[Sweep, Path, Sequence[Key], OnProgress], dict[Key, Exception]]
-EvaluateMember = Callable[[Sweep, Path, Key], None]
+EvaluateMembers = Callable[[Sweep, Path, Sequence[Key]], dict[Key, Exception]]
 
 
 def main(
     argv: Sequence[str],
     train: TrainMembers = train_members,
-    evaluate: EvaluateMember = evaluate_member,
+    evaluate: EvaluateMembers = evaluate_members,
 ) -> int:
     """Trains and evaluates members, and returns the exit status.
 
     Args:
         argv: directory of the sweep, then configuration and seed of each member.
         train: trains members, and returns those that ended on their own.
-        evaluate: evaluates one that was trained.
+        evaluate: evaluates those that were trained, and returns those that failed.
     """
     root, words = Path(argv[0]), argv[1:]
     keys = [Key(n, int(s)) for n, s in zip(words[::2], words[1::2], strict=True)]
@@ -53,21 +53,18 @@ def main(
         raise InputError(root / SPEC_FILE, "", "nothing", "a sweep")
     lost: dict[Key, Exception] = {}
 
-    def train_all() -> None:
-        lost.update(train(spec, root, keys, say))
+    def all_of(do: Callable[[Sequence[Key]], dict[Key, Exception]]) -> int:
+        left = [key for key in keys if key not in lost]
+        return _attempted(root, left, lambda: lost.update(do(left)))
 
     with ExitStack() as stack:
         for key in keys:
             _hold(stack, key.directory(root))
             forget_outcome(root, key)
-        if status := _attempted(root, keys, train_all):
-            return status
-        found = [_attempted(root, [k], _raising(error)) for k, error in lost.items()]
-        trained = [key for key in keys if key not in lost]
-        found += [
-            _attempted(root, [k], partial(evaluate, spec, root, k)) for k in trained
-        ]
-        return max(found)
+        status = all_of(lambda left: train(spec, root, left, say))
+        status = status or all_of(partial(evaluate, spec, root))
+        alone = [_attempted(root, [k], _raising(error)) for k, error in lost.items()]
+        return status or max(alone, default=0)
 
 
 def say(event: Event) -> None:

@@ -38,7 +38,7 @@ def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engi
         root: directory of the sweep, absolute.
         command: of a worker.
     """
-    most = spec.worlds_at_once or machine_worlds(spec.backend)
+    most = most_worlds(spec)
     slots = spec.processes or (default_processes(spec) if spec.backend == "warp" else 1)
     known: dict[Key, str] = {}
 
@@ -46,7 +46,7 @@ def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engi
         first = waiting[0]
         for key in (*keys(spec), *waiting):
             if key not in known:
-                known[key] = _shared(trainings(spec, root, key))
+                known[key] = shared(trainings(spec, root, key))
         alike = [
             key
             for key in waiting
@@ -58,6 +58,11 @@ def population(spec: Sweep, root: Path, command: Sequence[str] = WORKER) -> Engi
         return tuple(alike[: max(1, min(most // worlds, share) >> failures(first))])
 
     return worker_engine(spec, root, command, slots, choose)
+
+
+def most_worlds(spec: Sweep) -> int:
+    """Returns how many worlds one program of a sweep may have."""
+    return spec.worlds_at_once or machine_worlds(spec.backend)
 
 
 def machine_worlds(backend: str | None) -> int:
@@ -72,10 +77,14 @@ def machine_worlds(backend: str | None) -> int:
     return int(min(memory_mib) / 1024 * WORLDS_PER_GIB) if memory_mib else WORLDS_ON_CPU
 
 
-def _shared(stages: Sequence[Training]) -> str:
-    """Returns what a member shares with the others of its program, as text."""
-    shared = [[one.path.name, program(one.setup)] for one in stages]
-    return json.dumps(shared, sort_keys=True)
+def shared(stages: Sequence[Training]) -> str:
+    """Returns what a member shares with the others of its program, as text.
+
+    Args:
+        stages: of the member.
+    """
+    found = [[one.path.name, program(one.setup)] for one in stages]
+    return json.dumps(found, sort_keys=True)
 
 
 def _reached(spec: Sweep, root: Path, key: Key) -> list[int]:

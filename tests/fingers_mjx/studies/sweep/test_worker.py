@@ -27,7 +27,7 @@ def root(tmp_path):
     return tmp_path
 
 
-def run(root, error=None, lost=(), keys=(ONE,), evaluated=None):
+def run(root, error=None, lost=(), keys=(ONE,), evaluated=None, unmeasured=()):
     """Runs a worker whose training raises `error`, or loses members."""
 
     def train(spec, root, keys, on_progress):
@@ -36,8 +36,9 @@ def run(root, error=None, lost=(), keys=(ONE,), evaluated=None):
         on_progress({"event": "note", "text": "trained"})
         return dict(lost)
 
-    def evaluate(spec, root, key):
-        (evaluated if evaluated is not None else []).append(key)
+    def evaluate(spec, root, keys):
+        (evaluated if evaluated is not None else []).extend(keys)
+        return dict(unmeasured)
 
     words = [word for key in keys for word in map(str, key)]
     return worker.main([str(root), *words], train, evaluate)
@@ -76,6 +77,15 @@ def test_a_member_that_is_lost_does_not_take_others_with_it(root):
     status = run(root, lost={TWO: DIVERGED}, keys=(ONE, TWO), evaluated=evaluated)
     assert (status, evaluated) == (3, [ONE])
     assert verdict(root, TWO, status).verdict == "diverged"
+
+
+def test_an_evaluation_that_fails_does_not_take_others_with_it(root):
+    error = InputError("evaluation", "contacts_per_world", 48, "about 96")
+    status = run(root, unmeasured={TWO: error}, keys=(ONE, TWO))
+    assert status == 2
+    assert "contacts_per_world" in verdict(root, TWO, status).reason
+    # The other has no reason beside it: nothing of it went wrong.
+    assert verdict(root, ONE, 0).reason != verdict(root, TWO, status).reason
 
 
 def test_rows_of_the_curve_stay_out_of_the_log(capsys):
