@@ -30,7 +30,7 @@ from fingers_mjx.evaluation.files import (
     write_table,
 )
 from fingers_mjx.evaluation.measures import CONTACT_N
-from fingers_mjx.policy.actor import acting
+from fingers_mjx.policy.actor import acting_together
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures
 from fingers_mjx.reports.page import commit_here
@@ -126,7 +126,8 @@ def evaluate_source(
     batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
     table = evaluate(
         batch,
-        acting(source.network),
+        # As when several are evaluated together: alike to the last bit on the CPU.
+        acting_together([source.network]),
         Episodes(episodes, batch.episode_length, jax.random.key(seed)),
         measuring(batch),
         progress,
