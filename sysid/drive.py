@@ -1,5 +1,6 @@
 """What is known of the drives of joints: the contents of `drive.yaml`."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -46,12 +47,67 @@ class Masses:
 
 
 @dataclass(frozen=True)
+class Cascade:
+    """A position loop around a velocity loop (P-PI), by the gains of such a drive.
+
+        v_ref = clip(k_pos (target − angle), ± speed_limit)
+        τ = k_vel (v_ref − speed) + k_int ∫ (v_ref − speed) dt
+
+    Without integral and limit that is a servo with kp = k_pos k_vel and kd = k_vel.
+
+    Attributes:
+        k_pos: gain of the position loop [1/s], more than 0.
+        k_vel: gain of the velocity loop [N·m·s/rad, or N·s/m], more than 0.
+        k_int: its integral gain [N·m/rad, or N/m], at least 0; 0: no integral.
+        speed_limit: largest |v_ref| [rad/s, or m/s], more than 0; inf: none.
+    """
+
+    k_pos: Nominal
+    k_vel: Nominal
+    k_int: Nominal = field(default_factory=lambda: Nominal(0.0))
+    speed_limit: float = math.inf
+
+    def __post_init__(self) -> None:
+        for name in ("k_pos", "k_vel"):
+            if not 0.0 < getattr(self, name).value < math.inf:
+                found = getattr(self, name).value
+                raise InputError("drive", f"{name}.value", found, "more than 0")
+        integral = self.k_int
+        if not 0.0 <= integral.value < math.inf:
+            raise InputError("drive", "k_int.value", integral.value, "at least 0")
+        if integral.free and not integral.value:
+            valid = "more than 0, where a search may begin"
+            raise InputError("drive", "k_int.value", integral.value, valid)
+        if not self.speed_limit > 0.0:
+            raise InputError("drive", "speed_limit", self.speed_limit, "more than 0")
+
+    def gains(self) -> tuple[Nominal, Nominal]:
+        """Gains of the law without integral: kp = k_pos k_vel, kd = k_vel.
+
+        Returns:
+            Position gain [N·m/rad], whose relative tolerance is √(t_pos² + t_vel²), and
+            velocity gain [N·m·s/rad].
+
+        Source:
+            Textbook: errors of factors that are independent.
+        """
+        product = self.k_pos.value * self.k_vel.value
+        tolerance = math.hypot(self.k_pos.tolerance, self.k_vel.tolerance)
+        free = self.k_pos.free or self.k_vel.free
+        return Nominal(product, tolerance, free), self.k_vel
+
+
+_NOT_GIVEN = Nominal(math.nan)
+"""A gain that is not in the file."""
+
+
+@dataclass(frozen=True)
 class JointDrive:
     """Drive of one joint as simulated so far.
 
     Attributes:
-        kp: position gain [N·m/rad, or N/m].
-        kd: velocity gain [N·m·s/rad, or N·s/m].
+        kp: position gain [N·m/rad, or N/m]; with a cascade that of its `gains`.
+        kd: velocity gain [N·m·s/rad, or N·s/m]; the same.
         kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
             the gain is the same in all records.
         effort: column that holds the effort of the drive.
@@ -60,18 +116,21 @@ class JointDrive:
         known: `controller` where unknown forces push on the joint, `mechanics` where
             the law of the controller is not known: only that part is examined then.
         masses: how well those that the joint moves are known.
+        cascade: gains of a drive with a velocity loop, in the place of `kp` and `kd`.
     """
 
-    kp: Nominal
-    kd: Nominal
+    kp: Nominal = _NOT_GIVEN
+    kd: Nominal = _NOT_GIVEN
     kp_setting: str = ""
     effort: Effort = "tau"
     effort_scale: Nominal = field(default_factory=lambda: Nominal(1.0, 0.02))
     effects: dict[str, dict[str, Nominal]] = field(default_factory=dict)
     known: Part = "both"
     masses: Masses = field(default_factory=Masses)
+    cascade: Cascade | None = None
 
     def __post_init__(self) -> None:
+        self._take_cascade()
         for name, parameters in self.effects.items():
             known = effect_kind(name).parameters
             for parameter in parameters:
@@ -80,8 +139,22 @@ class JointDrive:
                     raise InputError("drive", f"effects.{name}", parameter, valid)
                 _check_range(name, parameter, parameters[parameter].value)
         for name in ("kp", "kd"):
+            if getattr(self, name) is _NOT_GIVEN:
+                valid = "a mapping of value, tolerance, free; or `cascade`"
+                raise InputError("drive", name, "", valid)
             if not getattr(self, name).value >= 0.0:
                 raise InputError("drive", name, getattr(self, name).value, "at least 0")
+
+    def _take_cascade(self) -> None:
+        """Takes the gains of the cascade; others beside them are refused."""
+        if self.cascade is None:
+            return
+        for name, gain in zip(("kp", "kd"), self.cascade.gains(), strict=True):
+            given = getattr(self, name)
+            if given is not _NOT_GIVEN and given != gain:
+                valid = "nothing beside `cascade`: kp is k_pos k_vel, and kd k_vel"
+                raise InputError("drive", name, given.value, valid)
+            object.__setattr__(self, name, gain)
 
     def parameter(self, effect: str, name: str, absent: float) -> float:
         """Returns a parameter of an effect that the simulation has, else `absent`."""

@@ -176,6 +176,22 @@ def joint_address(
     return model.jnt_qposadr[ids], model.jnt_dofadr[ids]
 
 
+def check_two_gains(mechanism: Mechanism, action: str) -> None:
+    """Refuses a cascade where every drive is simulated as a servo with two gains.
+
+    Args:
+        mechanism: the simulation as it stands.
+        action: what is done, for the message.
+
+    Raises:
+        InputError: a joint whose drive has a velocity loop.
+    """
+    for joint, drive in mechanism.drives.items():
+        if drive.cascade is not None:
+            valid = f"kp and kd: {action} simulates servos with two gains alone"
+            raise InputError("drive", f"{joint}.cascade", "a velocity loop", valid)
+
+
 def _hand_drive(hand: HandFile, index: int) -> JointDrive:
     """Drive of one joint of the hand."""
     link = hand.nominal.links[index]

@@ -24,7 +24,7 @@ from envs.hand.quantity import JointQuantity, Quantity
 from sysid.calibration.friction import Pull, is_pull, pull_of
 from sysid.calibration.joint import JointFit, fit_joint
 from sysid.logs.log import MeasuredLog
-from sysid.mechanism import Mechanism
+from sysid.mechanism import Mechanism, check_two_gains
 from sysid.result import Estimate
 
 _PULL = ("source", "finger", "normal_n", "friction", "deviation", "start_s", "stop_s")
@@ -84,8 +84,9 @@ def calibrate(
 
     Raises:
         InputError: records that cannot be used, of joints that the mechanism lacks, or
-            that move nothing.
+            that move nothing; or a drive with a velocity loop.
     """
+    check_two_gains(mechanism, "a calibration")
     moving = [log for log in logs if not is_pull(log)]
     pulls = tuple(pull_of(log) for log in logs if is_pull(log))
     fits = {}

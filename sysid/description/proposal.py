@@ -17,6 +17,9 @@ from sysid.drive import Effort, JointDrive, Nominal, Part
 LAW = 0.8
 """Share of an effort below which another law than gains on the angle drives."""
 
+VELOCITY_LOOP = "gains of a drive with a velocity loop go into `cascade`"
+"""What its owner may know of another law."""
+
 KNOWN = 0.05
 """Tolerance of a figure that its owner gives."""
 
@@ -140,8 +143,8 @@ def _known(law: Law | None, column: str, row_s: float) -> tuple[Part, str]:
         part = "both" if column == "none" else "controller"
         return part, f"rows {1e3 * row_s:.0f} ms apart show rests alone"
     if column != "none" and law.share < LAW:
-        said = f"gains explain {law.share:.0%} of the effort: another law drives"
-        return "mechanics", said
+        said = f"gains explain {law.share:.0%} of the effort: another law drives;"
+        return "mechanics", f"{said} {VELOCITY_LOOP}"
     what = "torque that the motion takes" if column == "none" else "effort"
     return "both", f"gains explain {law.share:.0%} of the {what}"
 

@@ -16,7 +16,12 @@ from envs.actuator.effect import Stage
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from sysid.excitation.plan import Limits, Plan, Schedule, make_plan
-from sysid.mechanism import Mechanism, joint_address, joint_range
+from sysid.mechanism import (
+    Mechanism,
+    check_two_gains,
+    joint_address,
+    joint_range,
+)
 
 STEP_S = 0.001
 _SHRINK = 0.75
@@ -58,8 +63,10 @@ def fitting_plan(
         limits: what to keep to.
 
     Raises:
-        InputError: a wave that leaves a limit even when it is small.
+        InputError: a wave that leaves a limit even when it is small, or a drive with
+            a velocity loop.
     """
+    check_two_gains(mechanism, "a plan")
     scales: dict[tuple[str, str], float] = {}
     once = replace(schedule, repeats=1)
     for _ in range(_MAX_ROUNDS):

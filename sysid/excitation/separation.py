@@ -25,7 +25,7 @@ from sysid.drive import JointDrive
 from sysid.excitation.bench import JointBench, joint_bench
 from sysid.excitation.check import STEP_S
 from sysid.excitation.plan import Plan
-from sysid.mechanism import Mechanism
+from sysid.mechanism import Mechanism, check_two_gains
 
 NEEDED_NAT = 6.0
 """Log-likelihood gain from which on an effect counts as seen, or as distinguished."""
@@ -97,7 +97,11 @@ def separation(
         plan: the plan.
         joint: a joint that it moves.
         noise: of the log that will be written.
+
+    Raises:
+        InputError: a drive with a velocity loop.
     """
+    check_two_gains(mechanism, "a plan")
     noise, drive = noise or Noise(), mechanism.drives[joint]
     bench = joint_bench(mechanism, plan, joint)
     kinds = _kinds(drive)

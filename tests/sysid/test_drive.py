@@ -1,14 +1,19 @@
 """Figures of `drive.yaml`: a robot of any size, and what no robot has."""
 
+import math
 import re
-from dataclasses import fields
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 from envs.config.typed import from_dict
 from envs.errors import InputError
-from sysid.drive import DriveFile, JointDrive, Masses, Nominal
+from sysid.calibration.calibrate import calibrate
+from sysid.drive import Cascade, DriveFile, JointDrive, Masses, Nominal
+from sysid.excitation.check import fitting_plan
+from sysid.excitation.plan import Limits, Schedule
+from sysid.mechanism import hand_mechanism
 
 GUIDE = Path(__file__).parents[2] / "docs/guides/diagnose.md"
 
@@ -81,6 +86,95 @@ def test_masses_of_another_form_are_refused(masses, match):
     ) as said:
         read(masses=masses)
     assert "\n" not in str(said.value)
+
+
+LOOPS = {"k_pos": {"value": 12.0}, "k_vel": {"value": 0.3}}
+
+
+def read_cascade(beside=None, **cascade):
+    joint = {"cascade": {**LOOPS, **cascade}, **(beside or {})}
+    return from_dict(DriveFile, {"schema": 1, "joints": {"knee": joint}}, "drive.yaml")
+
+
+def test_a_cascade_is_read_in_the_place_of_two_gains():
+    given = read_cascade(
+        k_pos={"value": 12.0, "tolerance": 0.03},
+        k_vel={"value": 0.3, "tolerance": 0.04, "free": True},
+        k_int={"value": 6.0},
+        speed_limit=2.0,
+    )
+    drive = given.joints["knee"]
+    k_vel = Nominal(0.3, 0.04, True)
+    assert drive.cascade == Cascade(Nominal(12.0, 0.03), k_vel, Nominal(6.0), 2.0)
+    assert drive.kd == k_vel
+    assert drive.kp.value == pytest.approx(3.6)
+    assert drive.kp.tolerance == pytest.approx(0.05)
+    assert drive.kp.free is True
+
+
+def test_integral_and_speed_limit_may_be_absent():
+    cascade = read_cascade().joints["knee"].cascade
+    assert (cascade.k_int.value, cascade.speed_limit) == (0.0, math.inf)
+    assert read().joints["knee"].cascade is None
+
+
+def test_a_cascade_survives_changes_of_other_fields():
+    drive = read_cascade().joints["knee"]
+    assert replace(drive, effort="none").cascade == drive.cascade
+
+
+def test_gains_beside_a_cascade_are_refused():
+    for name in ("kp", "kd"):
+        with pytest.raises(InputError, match=rf"{name}: found 5\.0; .*`cascade`"):
+            read_cascade({name: {"value": 5.0}})
+
+
+def test_a_joint_without_gains_is_refused():
+    with pytest.raises(InputError, match=r"kp: .*or `cascade`"):
+        from_dict(DriveFile, {"schema": 1, "joints": {"knee": {}}}, "drive.yaml")
+    with pytest.raises(InputError, match=r"kd: .*or `cascade`"):
+        JointDrive(Nominal(5.0))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "match"),
+    [
+        ({"k_pos": {"value": 0.0}}, r"k_pos\.value: found 0\.0; valid: more than 0$"),
+        ({"k_pos": {"value": -1.0}}, r"k_pos\.value: found -1\.0"),
+        ({"k_vel": {"value": -0.3}}, r"k_vel\.value: found -0\.3"),
+        ({"k_vel": {"value": math.nan}}, r"k_vel\.value: found nan"),
+        ({"k_int": {"value": -6.0}}, r"k_int\.value: found -6\.0; valid: at least 0$"),
+        (
+            {"k_int": {"value": 0.0, "free": True}},
+            r"k_int\.value: .* a search may begin",
+        ),
+        ({"speed_limit": 0.0}, r"speed_limit: found 0\.0; valid: more than 0$"),
+        ({"speed_limit": -2.0}, r"speed_limit: found -2\.0"),
+        ({"k_speed": {"value": 1.0}}, r"cascade\.k_speed: .*valid: one of"),
+    ],
+)
+def test_a_cascade_that_no_drive_has_is_refused(wrong, match):
+    with pytest.raises(InputError, match=match) as said:
+        read_cascade(**wrong)
+    assert "\n" not in str(said.value)
+
+
+@pytest.mark.parametrize("missing", ["k_pos", "k_vel"])
+def test_a_cascade_without_a_gain_is_refused(missing):
+    loops = {name: gain for name, gain in LOOPS.items() if name != missing}
+    file = {"schema": 1, "joints": {"knee": {"cascade": loops}}}
+    with pytest.raises(InputError, match=rf"cascade\.{missing}"):
+        from_dict(DriveFile, file, "drive.yaml")
+
+
+def test_what_knows_two_gains_alone_refuses_a_cascade():
+    mechanism = replace(
+        hand_mechanism(), drives={"finger1_joint1": read_cascade().joints["knee"]}
+    )
+    with pytest.raises(InputError, match=r"finger1_joint1\.cascade: .*a calibration"):
+        calibrate([], mechanism)
+    with pytest.raises(InputError, match=r"finger1_joint1\.cascade: .*a plan"):
+        fitting_plan(mechanism, [], Schedule(), Limits())
 
 
 def test_the_guide_has_every_field_of_a_joint():

@@ -3,12 +3,13 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from benchmarks.diagnosis.hidden.cases import Case
 from benchmarks.diagnosis.hidden.plant import ROTOR_SHARE, build
 from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
 from benchmarks.diagnosis.hidden.truth import Joint
-from sysid.drive import Effort, JointDrive, Masses, Nominal
+from sysid.drive import Cascade, Effort, JointDrive, Masses, Nominal
 from sysid.mechanism import Mechanism, model_mechanism
 
 
@@ -33,8 +34,7 @@ def _drive(joint: Joint, stand: Stand, effort: Effort) -> JointDrive:
         "torque_limit": {"limit_nm": (joint.limit_nm, "kp")},
     }
     return JointDrive(
-        kp=Nominal(joint.kp, known["kp"], free=stand.gains_free),
-        kd=Nominal(joint.kd, known["kd"], free=stand.gains_free),
+        **_gains(joint, known, stand.gains_free),
         effort=effort,
         masses=Masses(known["mass"]),
         effects={
@@ -43,6 +43,16 @@ def _drive(joint: Joint, stand: Stand, effort: Effort) -> JointDrive:
             if all(math.isfinite(v) for v, _ in values.values())
         },
     )
+
+
+def _gains(joint: Joint, known: Mapping[str, float], free: bool) -> dict[str, Any]:
+    """What the manual of the drive says: two gains, or those of two loops."""
+    kd = Nominal(joint.kd, known["kd"], free)
+    if not joint.k_int and math.isinf(joint.ref_rad_s):
+        return {"kp": Nominal(joint.kp, known["kp"], free), "kd": kd}
+    k_pos = Nominal(joint.kp / joint.kd, known["kp"], free)
+    k_int = Nominal(joint.k_int, known["k_int"], free)
+    return {"cascade": Cascade(k_pos, kd, k_int, joint.ref_rad_s)}
 
 
 def _known(tolerances: Mapping[str, float], name: str) -> float:

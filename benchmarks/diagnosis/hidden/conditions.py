@@ -14,7 +14,7 @@ import numpy as np
 from benchmarks.diagnosis.hidden.motions import MOTIONS, user_motion
 from benchmarks.diagnosis.hidden.recording import Recording, standard
 from benchmarks.diagnosis.hidden.sampling import Noise
-from benchmarks.diagnosis.hidden.stands import TOLERANCES, Stand
+from benchmarks.diagnosis.hidden.stands import Stand
 
 LEVELS: Mapping[str, tuple] = {
     "rig": ("pendulum", "joint", "axis", "arm"),
@@ -87,7 +87,7 @@ class Conditions:
         """A stand whose drive has this command path and is known this well."""
         known = replace(
             stand,
-            tolerances=TOLERANCES | GAINS[self.gains],
+            tolerances={**stand.tolerances, **GAINS[self.gains]},
             gains_free=self.gains == "unknown",
         )
         if not math.isinf(self.lowpass_hz):

@@ -36,6 +36,9 @@ class JointDrive:
         self.grid = value("command_quantization", "step_rad", 0.0)
         self.kp = joint.kp * value("stiffness", "scale", 1.0)
         self.kd = joint.kd * value("damping", "scale", 1.0)
+        self.k_int, self.fastest = joint.k_int, joint.ref_rad_s
+        self.cascade = joint.k_int > 0.0 or math.isfinite(joint.ref_rad_s)
+        self.integral = self.rise = 0.0
         self.zone = value("deadband", "half_width_rad", 0.0)
         self.start = value("start_torque", "torque_nm", 0.0)
         self.still = value("start_torque", "from_rad", 0.0)
@@ -90,10 +93,10 @@ class JointDrive:
         error = self.command - self.encoder(q)
         if self.zone:
             error -= min(max(error, -self.zone), self.zone)
-        asked = self.kp * error - self.kd * self._encoder_speed(q, v)
+        asked = self._asked(error, self._encoder_speed(q, v))
         if abs(error) > self.still:
             asked += math.copysign(self.start, error)
-        asked = min(max(asked, -self.limit), self.limit)
+        asked = self._limited(asked)
         if self.slope < math.inf:
             rise = self.slope * self.h
             asked = self.asked + min(max(asked - self.asked, -rise), rise)
@@ -103,6 +106,22 @@ class JointDrive:
         if self.heat:
             self.warmth += self.h * (self.heat * torque**2 - self.cool * self.warmth)
         return torque
+
+    def _asked(self, error: float, speed: float) -> float:
+        """Torque by the servo's law [N·m]; of a cascade by its two loops."""
+        if not self.cascade:
+            return self.kp * error - self.kd * speed
+        wanted = self.kp / self.kd * error
+        slip = min(max(wanted, -self.fastest), self.fastest) - speed
+        self.rise = self.h * self.k_int * slip
+        return self.kd * slip + self.integral
+
+    def _limited(self, asked: float) -> float:
+        """Limits the torque; the integral stops where it would wind up."""
+        given = min(max(asked, -self.limit), self.limit)
+        if (asked - given) * self.rise <= 0.0:
+            self.integral += self.rise
+        return given
 
     def resist(self, q: float, v: float, load: float) -> float:
         """Returns the torque of everything passive at the joint [N·m]."""

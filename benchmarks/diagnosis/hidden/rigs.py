@@ -1,4 +1,4 @@
-"""Rigs that are no hand: a vertical axis, and an arm of two links with a payload."""
+"""Rigs that are no hand: a vertical axis, an arm of two links, an industrial joint."""
 
 import math
 
@@ -73,6 +73,29 @@ def arm(rng: np.random.Generator, lowpass_hz: float):
         servo_of(at_elbow, armature[1], 4.0 * weight_nm[0], lowpass_hz, rng),
     )
     return Mechanism(links, joints), np.array([0.2, 0.5]), np.array([0.5, 0.5])
+
+
+def cascade(rng: np.random.Generator, lowpass_hz: float):
+    """A joint of an industrial arm in small: two loops and one link.
+
+    Returns the mechanism, the moved joint, middle and reach [rad].
+    """
+    mass, length = rng.uniform(0.15, 0.3), rng.uniform(0.08, 0.12)
+    own, armature = mass * length**2 / 3.0, rng.uniform(2e-3, 4e-3)
+    inertia = armature + own + mass * length**2
+    kd = inertia * rng.uniform(50.0, 90.0)
+    joint = Joint(
+        kp=kd * rng.uniform(8.0, 15.0),
+        kd=kd,
+        armature=armature,
+        delay_s=0.004,
+        lowpass_hz=lowpass_hz,
+        limit_nm=rng.uniform(4.0, 8.0) * 9.81 * mass * length,
+        k_int=kd / rng.uniform(0.03, 0.08),
+        ref_rad_s=rng.uniform(1.5, 2.5),
+    )
+    link = _link("shoulder", (0.0, 0.0, 0.0), mass, length, own)
+    return Mechanism((link,), (joint,)), (0,), np.array([0.3]), np.array([0.5])
 
 
 def _link(name, pos, mass, com, own, parent="world") -> Link:

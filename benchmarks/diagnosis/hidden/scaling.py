@@ -57,6 +57,7 @@ def _scaled_joint(joint: Joint, factor: float) -> Joint:
         joint,
         kp=joint.kp * factor,
         kd=joint.kd * factor,
+        k_int=joint.k_int * factor,
         armature=joint.armature * factor,
         limit_nm=joint.limit_nm * factor,
         effects=effects,

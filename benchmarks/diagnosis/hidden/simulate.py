@@ -55,6 +55,9 @@ def simulate(
         JointDrive(joint, ticks, targets[:, i].tolist(), step_s)
         for i, joint in enumerate(mechanism.joints)
     ]
+    for drive, at in zip(drives, plant.link, strict=True):
+        # An integral has had its time to bear the weight.
+        drive.integral = data.qfrc_bias.item(at) if drive.k_int else 0.0
     # A tick that comes late in the last step still needs a sample after it.
     steps = int(np.ceil(times[-1] / step_s)) + 2
     return _run(mechanism, plant, data, drives, steps, step_s)

@@ -1,8 +1,8 @@
 """Test stands: mechanisms as they are believed to be, before anything is hidden.
 
-`pendulum` is a servo with a weight, `axis` and `arm` are those of `rigs`; `joint` is
-one joint of a finger of the hand, `finger` all four of one, `hand` all twenty on one
-palm. The last three take the vendor's kinematics and the calibrated drive.
+`pendulum` is a servo with a weight, `axis`, `arm` and `cascade` are those of `rigs`;
+`joint` is one joint of a finger of the hand, `finger` all four of one, `hand` all
+twenty on one palm. The last three take the vendor's kinematics and its drive.
 """
 
 import math
@@ -16,7 +16,7 @@ from benchmarks.diagnosis.hidden.truth import Joint, Link, Mechanism
 from envs.hand.hand_file import load_hand_file
 from envs.hand.nominal import vendor_hand
 
-KINDS = ("pendulum", "axis", "arm", "joint", "finger", "hand")
+KINDS = ("pendulum", "axis", "arm", "cascade", "joint", "finger", "hand")
 TOLERANCES = {
     "kp": 0.05,
     "kd": 0.1,
@@ -66,6 +66,9 @@ def make_stand(kind: str, rng: np.random.Generator, lowpass_hz: float = 3.0) -> 
     if kind in ("axis", "arm"):
         mechanism, middle, reach = getattr(rigs, kind)(rng, lowpass_hz)
         return Stand(kind, mechanism, tuple(range(len(reach))), middle, reach)
+    if kind == "cascade":
+        known = {**TOLERANCES, "kd": 0.05, "k_int": 0.05}
+        return Stand(kind, *rigs.cascade(rng, lowpass_hz), tolerances=known)
     finger = int(rng.integers(1, 5))
     mechanism, middle, reach = _finger(finger, rng, lowpass_hz)
     if kind == "finger":

@@ -22,6 +22,8 @@ class Joint:
         armature: inertia of rotor and gears at the joint [kg·m²].
         delay_s, lowpass_hz, slew_rad_s, limit_nm: command path and torque limit.
         offset_rad: error of the encoder's zero that calibration did not remove.
+        k_int, ref_rad_s: of a loop around the speed: its integral gain [N·m/rad], and
+            the largest speed that the loop around the angle asks for.
         effects: parameters of hidden effects.
     """
 
@@ -33,6 +35,8 @@ class Joint:
     slew_rad_s: float = math.inf
     limit_nm: float = math.inf
     offset_rad: float = 0.0
+    k_int: float = 0.0
+    ref_rad_s: float = math.inf
     effects: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     def value(self, effect: str, name: str, default: float) -> float:

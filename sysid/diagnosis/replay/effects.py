@@ -1,8 +1,8 @@
 """Effects of the catalogue as they act along a measured motion.
 
-Beside them stand four that only the replay has: friction at the smoothed speed, the
-supply's sag under measured torques, the servo at the measured angle, and the measured
-effort that enters the gears.
+Beside them stand five that only the replay has: friction at the smoothed speed, the
+supply's sag under measured torques, the servo at the measured angle, the measured
+effort that enters the gears, and the integral of a cascade.
 """
 
 import dataclasses
@@ -12,7 +12,7 @@ import jax.numpy as jnp
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import EffectKind, Params, Stage
-from sysid.diagnosis.replay import command, link
+from sysid.diagnosis.replay import cascade, command, link
 from sysid.diagnosis.replay.torque_slope import SLOPE
 
 WALKING = ("finger_weakness",)
@@ -71,8 +71,9 @@ ENTER = _replay_only(
 )
 KINDS = {
     name: CATALOGUE[name] for name in joint_effects() if name not in command.EFFECTS
-}
-"""Effects that act behind the command path."""
+} | {cascade.NAME: cascade.KIND}
+"""Effects that act behind the command path, and the part of a cascade that a servo with
+two gains lacks."""
 
 _SAG = CATALOGUE["supply_sag"]
 RIGID = {n: kind for n, kind in KINDS.items() if n not in link.EFFECTS} | {

@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from envs.actuator.effect import EffectKind, Params, Substep
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import EVERY
+from sysid.diagnosis.replay.cascade import with_cascade
 from sysid.diagnosis.replay.command import Commands
 from sysid.diagnosis.replay.effects import ENTER, READ, RIGID, SLOW
 from sysid.diagnosis.replay.link import MOST_ROTOR
@@ -40,6 +41,7 @@ class Nuisance:
     push_gain: Float[Array, "*b c"]
     rotor: Float[Array, "*b c"]
     ripple: Float[Array, "*b c"]
+    k_int: Float[Array, "*b c"]
 
 
 @flax.struct.dataclass
@@ -90,11 +92,10 @@ class Candidates:
         """Half the variance v of the smoothing: it adds v ẍ to a signal x [s²]."""
         return 0.5 * (SMOOTH_STEPS * self.dt) ** 2
 
-    @property
-    def slope_state(self) -> int:
-        """Place of the slope limit's state in the chain; 0 without one."""
+    def state_of(self, name: str) -> int:
+        """Place of an effect's state in the chain; 0 without the effect."""
         names = list(self.effects)
-        return 1 + names.index(SLOPE.name) if SLOPE.name in names else 0
+        return 1 + names.index(name) if name in names else 0
 
     def reading(self, now: Motion) -> tuple[Float[Array, "p c"], Float[Array, "p c"]]:
         """Angle and speed of the encoder, smoothed: y = p + Δ ṗ, ẏ = ṗ + Δ p̈.
@@ -197,6 +198,7 @@ def make_candidates(
         n: {k: v[None, :] for k, v in params[n].items()} for n in names if n in RIGID
     }
     nuisance = jax.tree.map(lambda v: v[None, :], nuisance)
+    wide = with_cascade(wide, track.cascade, nuisance.k_int)
     gap, compliance, rotor = _link_of(params, nuisance.rotor)
     whole = nuisance.mass * jnp.mean(track.inertia, 0)[:, None]
     inner = jnp.minimum(rotor, MOST_ROTOR * whole)

@@ -58,6 +58,7 @@ class Track(Motion):
         gravity: in the frame of the mount [m/s²].
         payload_kg: nominal mass of the payload [kg].
         kp, kd: nominal gains [N·m/rad], [N·m·s/rad].
+        cascade: parameters of `cascade.KIND`; none without one.
         measured: 1 where the logged effort enters the gears, else 0.
         between: 1 where the law is known by which the command's ripple between the
             readings makes torque, else 0.
@@ -73,6 +74,7 @@ class Track(Motion):
     payload_kg: Float[Array, " p"]
     kp: Float[Array, " p"]
     kd: Float[Array, " p"]
+    cascade: dict[str, Float[Array, " p"]]
     measured: Float[Array, " p"]
     between: Float[Array, ""]
     noise: Float[Array, "2 4"]

@@ -25,7 +25,7 @@ from jaxtyping import Array, Float
 
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import Substep
-from sysid.diagnosis.replay import link
+from sysid.diagnosis.replay import cascade, link
 from sysid.diagnosis.replay.band import band, smooth
 from sysid.diagnosis.replay.command import command_path
 from sysid.diagnosis.replay.model import (
@@ -39,6 +39,7 @@ from sysid.diagnosis.replay.model import (
 from sysid.diagnosis.replay.motion import Track
 from sysid.diagnosis.replay.noise import residual_noise
 from sysid.diagnosis.replay.surroundings import surroundings_at
+from sysid.diagnosis.replay.torque_slope import SLOPE
 
 
 @flax.struct.dataclass
@@ -164,9 +165,10 @@ def _step(
     states, x = chain_step(candidates.chain(row), carry.states, joint, dt)
     inertia = nuisance.mass * now.inertia + x.inertia
     gain = nuisance.effort_gain
-    ramp = candidates.slope_state
+    ramp = candidates.state_of(SLOPE.name)
     x = replace(x, follows=jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0))
-    passes = candidates.passes(x, _direction(now.slow_vel, friction_speed))
+    way = _direction(now.slow_vel, friction_speed)
+    passes = candidates.passes(x, way)
     noise, nominal = residual_noise(track, now, x, passes, gain, inertia / carry.slope)
     encoder, slope = _encoder_slope(states[-2], qd, carry.slope)
     # y = f(q), ÿ = f' q̈ + ḟ' q̇
@@ -174,6 +176,8 @@ def _step(
     acc = (acc - (slope - carry.slope) / dt * qd) / slope
     step = _JointStep(x, inertia, acc, row.snap, slope, now.slow_vel)
     behind, needed, loose = _transmission(candidates, step, friction_speed, carry.link)
+    taken = x.torque + x.viscous * now.slow_vel + x.friction * way - needed - loose
+    states = _integral(candidates, carry.states, states, x, taken)
     unit = gain * candidates.spring_gain * noise.mechanics / nominal.mechanics
     servo, (sharp_angle, sharp_rate) = states[-1], candidates.sharp_reading(now)
     enters = (1.0 - track.measured[:, None]) / unit
@@ -188,6 +192,22 @@ def _step(
         viscous=x.viscous / unit,
     )
     return Carry(states, q, encoder, slope, behind), torques
+
+
+def _integral(candidates: Candidates, before, states, x, taken):
+    """Lets the integral of a cascade follow what the motion takes.
+
+    Where the effort was logged it has followed that, and at a limit nothing.
+    """
+    at = candidates.state_of(cascade.NAME)
+    if not at:
+        return states
+    rate = cascade.rate_of(candidates.effects[cascade.NAME], x)
+    known = (candidates.track.measured[:, None] > 0.0) | (x.follows <= 0.0)
+    begun = cascade.answered(before[at], states[at].servo)
+    followed = cascade.follow(begun, taken, rate, candidates.dt)
+    mixed = jax.tree.map(lambda a, b: jnp.where(known, a, b), states[at], followed)
+    return (*states[:at], mixed, *states[at + 1 :])
 
 
 def _encoder_slope(modelled, qd, last):

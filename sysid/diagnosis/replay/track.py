@@ -11,6 +11,7 @@ from sysid.diagnosis.measured.checks import check_records
 from sysid.diagnosis.measured.resampling import smoothed
 from sysid.diagnosis.measured.segments import Piece, grid_step_s, pieces_of
 from sysid.diagnosis.replay.band import BAND_STEPS, sample_rows
+from sysid.diagnosis.replay.cascade import begins_anew, cascade_of
 from sysid.diagnosis.replay.motion import JointTrack, Track
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.timing_uncertainty import (
@@ -151,6 +152,7 @@ def _track(one: _Joint) -> JointTrack:
         | _constants(one, logged)
         | {"noise": np.stack([in_band, in_band])}
     )
+    fields["resumed"] = begins_anew(drive, fields["resumed"], step_s)
     speed = float(np.percentile(np.abs(np.concatenate(one.slow_speeds())), 98))
     at_rest = max(4.0 * in_band[1], 0.01 * speed, 1e-9)
     steps = len(fields["cmd"])
@@ -158,7 +160,10 @@ def _track(one: _Joint) -> JointTrack:
     dof = one.mechanism.model.joint(one.name).dofadr[0]
     return JointTrack(
         joint=one.name,
-        track=Track(**{k: jnp.asarray(v, jnp.float32) for k, v in fields.items()}),
+        track=Track(
+            cascade=cascade_of(drive, fields, logged),
+            **{k: jnp.asarray(v, jnp.float32) for k, v in fields.items()},
+        ),
         dt=step_s,
         valid=np.stack([supported(p, one.j, steps) for p in pieces], 1)[rows],
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,

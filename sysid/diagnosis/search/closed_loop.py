@@ -18,7 +18,7 @@ from jaxtyping import Array, Float
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
-from sysid.diagnosis.replay import band
+from sysid.diagnosis.replay import band, cascade
 from sysid.diagnosis.replay.command import command_path, held_command
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
@@ -126,7 +126,6 @@ def _simulated(
     """Integrates all candidates side by side."""
     acting = [name for name in program.effects if name in KINDS]
     effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in acting}
-    model = [(KINDS[n], effects[n]) for n in acting]
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
@@ -135,6 +134,8 @@ def _simulated(
     each = substeps // means
     targets = _targets(track, params, dt * each, means, program.moves)
     cut = _cut(track, targets, window, dt * substeps)
+    effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
+    model = [(KINDS[n], p) for n, p in effects.items()]
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
 
@@ -160,6 +161,7 @@ def _simulated(
         states, q, qd, y = carry
         anew = row[3][:, None] > 0.0
         q, qd = jnp.where(anew, before.pos, q), jnp.where(anew, before.vel, qd)
+        states = _begun(cut.track, before, nuisance, effects, states, anew)
 
         def within(i, c):
             share = (i + 0.5) / substeps
@@ -177,6 +179,21 @@ def _simulated(
     angles = jax.lax.scan(step, start, rows)[1]
     whole = angles.reshape(window, -1, pieces, count)
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
+
+
+def _begun(track: Track, now: Motion, nuisance: Nuisance, effects, states, anew):
+    """Gives the integral of a cascade the torque at which the record resumes."""
+    if cascade.NAME not in effects:
+        return states
+    at, mass = list(effects).index(cascade.NAME), nuisance.mass[None, :]
+    none = jnp.zeros_like(now.pos * mass)
+    load = surroundings_at(track, now, none, mass, nuisance.push_gain[None, :])[1]
+    taken = mass * now.inertia * now.acc - load
+    logged = track.measured[:, None] > 0.0
+    torque = jnp.where(logged, nuisance.effort_gain[None, :] * now.effort, taken)
+    anew = anew & (effects[cascade.NAME]["k_int"] > 0.0)
+    begun = cascade.begun(states[at], anew, torque)
+    return (*states[:at], begun, *states[at + 1 :])
 
 
 def _targets(track: Track, params, dt: float, means: int, moves: bool):

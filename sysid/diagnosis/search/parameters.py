@@ -184,7 +184,7 @@ class Space:
                 params.setdefault(slot.effect, {})[slot.name] = x
             else:
                 nuisance[slot.name] = x
-        for name in ("push_gain", "ripple"):
+        for name in ("push_gain", "ripple", "k_int"):
             nuisance.setdefault(name, np.ones(len(theta), np.float32))
         return params, Nuisance(**nuisance)
 

@@ -90,6 +90,10 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
     if plain and track.effort.any():
         sampled = _nuisance("ripple", "1", "linear", 1.0, SAMPLED)
         slots.append(replace(sampled, nominal=1.0, low=0.0, high=1.0))
+    if drive.cascade is not None and drive.cascade.k_int.value:
+        k_int = drive.cascade.k_int
+        tolerance = math.inf if k_int.free else k_int.tolerance
+        slots.append(_nuisance("k_int", "1", "log", 1.0, tolerance))
     if np.any(np.asarray(track.track.ext)):
         free = _nuisance("push_gain", "1", "linear", 1.0, math.inf)
         slots.append(replace(free, nominal=1.0))

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.diagnosis.hidden.believed import believed, true_parameters
 from benchmarks.diagnosis.hidden.cases import drawn_case
-from benchmarks.diagnosis.hidden.conditions import Conditions
+from benchmarks.diagnosis.hidden.conditions import LEVELS, Conditions
 from benchmarks.diagnosis.hidden.joint_drive import JointDrive
 from benchmarks.diagnosis.hidden.motions import MOTIONS, user_motion
 from benchmarks.diagnosis.hidden.stands import make_stand
@@ -32,7 +32,7 @@ def test_motions_begin_and_end_in_the_middle(name):
     assert not away[:, 1].any()
 
 
-@pytest.mark.parametrize("rig", ["axis", "arm"])
+@pytest.mark.parametrize("rig", ["axis", "arm", "cascade"])
 def test_rigs_follow_their_targets(rig):
     case = case_under(rig=rig, motion="sines", lowpass_hz=15.0)
     log = case.logs[0]
@@ -40,7 +40,7 @@ def test_rigs_follow_their_targets(rig):
         cmd, pos = log.column(f"cmd.{name}"), log.column(f"pos.{name}")
         assert np.ptp(cmd) > 0.2
         assert np.sqrt(np.nanmean((pos - cmd)[200:] ** 2)) < 0.25 * np.ptp(cmd)
-    gravity = rig == "arm"
+    gravity = rig != "axis"
     assert (np.nanstd(log.column(f"tau.{case.joint}")[-40:]) < 0.05) or gravity
 
 
@@ -100,3 +100,15 @@ def test_the_clock_and_the_jitter_of_a_host():
     assert period == pytest.approx(0.002 / 1.0002, rel=1e-5)
     late = log.t_s - start - period * row
     assert late.std() == pytest.approx(0.125 * 0.002, rel=0.1)  # cut off at 0.2
+
+
+def test_a_cascade_is_known_by_its_own_gains_and_drawn_by_no_battery():
+    """A further level would draw other records for every seed of the wide battery."""
+    case = case_under(rig="cascade", lowpass_hz=15.0)
+    joint = case.stand.mechanism.joints[0]
+    drive = believed(case.stand).drives["shoulder"]
+    assert drive.cascade.k_pos.value * drive.cascade.k_vel.value == joint.kp
+    assert drive.cascade.k_int.value == joint.k_int
+    assert drive.cascade.speed_limit == joint.ref_rad_s
+    assert case.truth.joints[0].k_int != joint.k_int
+    assert "cascade" not in LEVELS["rig"]

@@ -91,6 +91,23 @@ def test_command_path_by_its_step_response():
     assert np.argmax(slow > 0.999) * 5e-4 == pytest.approx(0.6, abs=0.002)
 
 
+def test_two_loops_hold_a_weight_and_keep_to_their_speed():
+    """No error is left, the joint moves at the speed asked for, and at the torque
+    limit nothing winds up: it comes back at once."""
+    loops = {"k_int": 4.0, "ref_rad_s": 0.5}
+    joint = Joint(KP, 0.4, 1e-3, 0.0, 1e3, **loops)
+    motion = held(Mechanism((WEIGHT,), (joint,)), 0.8, 4.0)
+    assert motion.angle[-1, 0] == pytest.approx(0.8, abs=1e-3)
+    assert motion.torque[-1, 0] == pytest.approx(MGL * math.sin(0.8), rel=1e-3)
+    assert np.max(motion.speed[500:, 0]) == pytest.approx(0.5, rel=0.05)
+    weak = Mechanism((WEIGHT,), (replace(joint, limit_nm=0.5 * MGL),))
+    times, targets = np.array([0.0, 3.0, 4.0]), np.array([[1.4], [0.0], [0.0]])
+    motion = simulate(weak, times, targets, np.array([0.0]))
+    back = motion.torque[round(3.02 / 4.02 * len(motion.t_s)), 0]
+    assert np.max(motion.torque) == pytest.approx(0.5 * MGL)
+    assert back < 0.25 * MGL
+
+
 @pytest.mark.parametrize(
     "effects",
     [

@@ -4,7 +4,9 @@ import io
 
 import numpy as np
 import pytest
+from support.cascade_rig import exact_log, stand_of
 
+from benchmarks.diagnosis.hidden.believed import believed
 from envs.config.typed import load_yaml
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
@@ -107,6 +109,14 @@ def test_an_effort_that_no_gain_makes_leaves_the_mechanics():
     other = np.cumsum(0.01 * rng.normal(size=len(log)))
     columns = dict(log.columns) | {"cmd.servo": other}
     assert described(make_log(("servo",), log.t_s, columns)).drive.known == "mechanics"
+
+
+def test_an_effort_of_two_loops_leads_to_the_cascade():
+    stand = stand_of(1)
+    (found,) = describe([exact_log(stand, 1)], believed(stand).model)
+    assert found.drive.known == "mechanics"
+    assert "`cascade`" in found.why["known"]
+    assert "cascade" not in described(record(tau=lambda x: x)).why["known"]
 
 
 def test_a_joint_that_rests_shows_nothing():
