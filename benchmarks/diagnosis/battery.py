@@ -196,7 +196,7 @@ def main() -> None:
     tasks = [t for t in tasks if t.group in args.groups]
     tasks = [t for t in tasks if only is None or t.number in only]
     name = "wide" if args.wide else "rows"
-    rows = _run(tasks, args.workers, args.out, f"{name}-{seed}.jsonl")
+    rows = run_all(tasks, args.workers, args.out, f"{name}-{seed}.jsonl")
     summary = {
         "seed": seed,
         "statistics": statistics(rows),
@@ -221,8 +221,15 @@ def _take_core() -> None:
         os.sched_setaffinity(0, map(int, own))
 
 
-def _run(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
-    """Runs what is not yet in the file of rows."""
+def run_all(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
+    """Runs what is not yet in the file of rows, and returns the rows of the tasks.
+
+    Args:
+        tasks: what is hidden where.
+        workers: processes at the same time.
+        out: directory of the file, which is made.
+        name: of the file, to which a row is added as its record finishes.
+    """
     out.mkdir(parents=True, exist_ok=True)
     file = out / name
     lines = file.read_text().splitlines() if file.exists() else []
