@@ -92,6 +92,8 @@ def _rows(job: Job, found: Found, args: argparse.Namespace, device: str) -> list
     commit = args.commit or commit_here() or "unknown"
     shared = {"seed": SEED, "device": device, "commit": commit}
     command += f" --only {job.name}"
+    if job.kind == "start":
+        command += f" --starts {args.starts}"
     command += " --here" * (args.here is not None) + " --together" * args.together
     made = rows(job, found, command=command, **shared)
     for row in made:
