@@ -3,14 +3,17 @@
     python -m benchmarks.comparison --out build/comparison
     python -m benchmarks.comparison --out build/comparison --device gpu --only speed
     python -m benchmarks.comparison --out build/comparison --here --together
-    python -m benchmarks.comparison.page benchmarks/results/comparison-cpu.jsonl
+    python -m benchmarks.comparison --out build/comparison --here mjlab=packages/mjlab
+    python -m benchmarks.comparison.page
 
 Each peer gets an environment of its own from pinned requirements. Measurements that
 have rows for this kind of device are skipped, so that the command goes on where it
 ended. A peer that cannot be installed, or that ends, gets a row with the reason.
 
-On a machine without a network, install the peers beside this project and say `--here`;
-with many cores and little time, `--together` readies the workers of all rates at once.
+On a machine without a network, install the peers beside this project and say `--here`,
+with a folder of its own (`pip install --target`) for a peer that needs other versions;
+with many cores and little time, `--together` readies the workers of all rates at once
+and `--limit` ends a worker that hangs.
 """
 
 import argparse
@@ -23,8 +26,8 @@ from pathlib import Path
 
 from benchmarks.comparison.figures import Found
 from benchmarks.comparison.measure import measure, rows
+from benchmarks.comparison.place import Place
 from benchmarks.comparison.plan import SEED, Job, jobs
-from benchmarks.comparison.process import Place
 from benchmarks.comparison.rows import Row, add_rows, lacking, read_rows
 from benchmarks.comparison.turns import by_turns
 from envs.hand.hand_file import load_hand_file
@@ -35,7 +38,7 @@ from fingers_mjx.reports.page import commit_here
 def main() -> int:
     """Runs from the command line."""
     args = _arguments()
-    place = Place(args.out.absolute(), args.device, args.here, args.starts)
+    place = _place(args)
     place.out.mkdir(parents=True, exist_ok=True)
     place.mjcf.write_text(standing_mjcf(load_hand_file()), encoding="utf-8")
     kept, device = args.out / f"comparison-{args.device}.jsonl", machine(args.device)
@@ -47,7 +50,7 @@ def main() -> int:
     lacks = [job for job in wanted if lacking(kept_rows, job.name, device)]
     try:
         for job, found in _measured(lacks, place, args.together):
-            add_rows(kept, _rows(job, found, place, device))
+            add_rows(kept, _rows(job, found, args, device))
     except KeyboardInterrupt:
         print("stopped; the same command goes on", file=sys.stderr)
         return 130
@@ -57,7 +60,7 @@ def main() -> int:
 
 def machine(device: str) -> str:
     """What the figures are taken on; nothing that names the machine."""
-    cores = f"{os.cpu_count()} cores ({platform.machine()})"
+    cores = f"{len(os.sched_getaffinity(0))} cores ({platform.machine()})"
     if device == "cpu":
         return f"CPU, {cores}"
     query = ["nvidia-smi", "--query-gpu=name", "--format=csv,noheader"]
@@ -79,15 +82,31 @@ def _measured(
         yield job, measure(job, place)
 
 
-def _rows(job: Job, found: Found, place: Place, device: str) -> list[Row]:
-    command = f"python -m benchmarks.comparison --out DIR --device {place.device}"
-    shared = {"seed": SEED, "device": device, "commit": commit_here() or "unknown"}
+def _place(args: argparse.Namespace) -> Place:
+    here = None if args.here is None else dict(args.here)
+    return Place(args.out.absolute(), args.device, here, args.starts, args.limit)
+
+
+def _rows(job: Job, found: Found, args: argparse.Namespace, device: str) -> list[Row]:
+    command = f"python -m benchmarks.comparison --out DIR --device {args.device}"
+    commit = args.commit or commit_here() or "unknown"
+    shared = {"seed": SEED, "device": device, "commit": commit}
     command += f" --only {job.name}"
+    if job.kind == "start":
+        command += f" --starts {args.starts}"
+    command += " --here" * (args.here is not None) + " --together" * args.together
     made = rows(job, found, command=command, **shared)
     for row in made:
         figure = row.note if row.value is None else f"{row.value:.4g} {row.unit}"
         print(f"{row.job}: {row.peer}: {row.quantity}: {figure}", flush=True)
     return made
+
+
+def _own_folder(words: str) -> tuple[str, str]:
+    peer, _, folder = words.partition("=")
+    if not Path(folder or "=").is_dir():
+        raise argparse.ArgumentTypeError(f"{words}: not PEER=DIR of a folder")
+    return peer, str(Path(folder).absolute())
 
 
 def _arguments() -> argparse.Namespace:
@@ -98,7 +117,11 @@ def _arguments() -> argparse.Namespace:
         "--only", nargs="+", default=[""], metavar="NAME", help="beginnings of names"
     )
     parser.add_argument(
-        "--here", action="store_true", help="take peers from this environment; no uv"
+        "--here",
+        nargs="*",
+        type=_own_folder,
+        metavar="PEER=DIR",
+        help="take peers from this environment, not from uv; DIR holds a peer's own",
     )
     parser.add_argument(
         "--together",
@@ -108,6 +131,14 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument(
         "--starts", type=int, default=3, metavar="N", help="starts of a worker, at most"
     )
+    parser.add_argument(
+        "--limit",
+        type=float,
+        default=float("inf"),
+        metavar="SECONDS",
+        help="what a worker has until it is ready, and for each answer",
+    )
+    parser.add_argument("--commit", metavar="NAME", help="of a source tree without git")
     return parser.parse_args()
 
 

@@ -5,8 +5,9 @@ from collections.abc import Callable
 
 from benchmarks.comparison.figures import Figure, Found, interval, none
 from benchmarks.comparison.peers import CannotInstallError
+from benchmarks.comparison.place import Place
 from benchmarks.comparison.plan import Job
-from benchmarks.comparison.process import FailedError, Place, speaking
+from benchmarks.comparison.process import FailedError, speaking
 from benchmarks.comparison.rows import Row
 from benchmarks.comparison.turns import by_turns
 

@@ -74,6 +74,9 @@ def jobs(device: str) -> tuple[Job, ...]:
     stand = (ours("ours_stand", backends[0]), playground("playground_stand", impls[0]))
     fast += tuple(playground("playground_speed", impl) for impl in impls)
     mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab_speed")
+    # Rates on CPUs keep the jobs that their rows were taken in.
+    alone = SIZES[device] if device == "cpu" else ()
+    fast += (mjlab,) if device == "gpu" else ()
     mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
     resumed = (
         ours("ours_resume", backends[0]),
@@ -90,10 +93,7 @@ def jobs(device: str) -> tuple[Job, ...]:
     return (
         Job("first", "start", until, first, FIRST_WORLDS[device]),
         *(Job(f"speed-{n}", "turns", speed, fast, n) for n in SIZES[device]),
-        *(
-            Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n)
-            for n in SIZES[device]
-        ),
+        *(Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n) for n in alone),
         Job("stand", "start", stands, stand, STAND_WORLDS[device], starts=1),
         Job("resume", "report", "resumption and export", resumed, 64),
         Job("sysid", "report", "parameters of one joint", (fits,), 1),

@@ -1,50 +1,28 @@
 """A worker as a process: started with its own interpreter, read line by line."""
 
 import json
-import os
 import re
 import subprocess
 import tempfile
+import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.comparison.peers import OURS, ROOT, python_of
+from benchmarks.comparison.place import FRESH, Place
 from benchmarks.comparison.plan import SEED, Job, Worker
 from benchmarks.comparison.workers.report import MARK
 
 KEPT = 300
 """Characters of a failed worker's last words that its row repeats."""
-CACHES = ("JAX_COMPILATION_CACHE_DIR", "FINGERS_COMPILE_CACHE")
-"""Where compiled programs would be found again; a start is measured without."""
+LATE_S = 1.0
+"""What a worker said in time is still read so long after its limit [s]."""
 
 
 class FailedError(Exception):
     """A worker that ended without its figure; the message is its last words."""
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a comparison keeps its things.
-
-    Attributes:
-        out: folder of rows, model and environments.
-        device: `cpu` or `gpu`.
-        here: whether peers are taken from this very environment.
-        starts: of each worker whose start is measured, at most.
-    """
-
-    out: Path
-    device: str
-    here: bool = False
-    starts: int = 3
-
-    @property
-    def mjcf(self) -> Path:
-        """The standing hand that peers are given."""
-        return self.out / "hand.xml"
 
 
 class Speaker:
@@ -55,17 +33,21 @@ class Speaker:
         job: for how many worlds.
         place: where.
         log: takes all that it says on its error stream.
+        environment: variables that it is given.
     """
 
-    def __init__(self, worker: Worker, job: Job, place: Place, log):
-        environment = OURS if place.here else worker.environment
-        python = python_of(environment, place.out / "environments")
+    def __init__(
+        self, worker: Worker, job: Job, place: Place, log, environment: dict[str, str]
+    ):
+        peer = worker.environment if place.here is None else OURS
+        python = python_of(peer, place.out / "environments")
         self.log, self.began_s = log, time.perf_counter()
+        self._asked_s, self._limit_s, self._late = self.began_s, place.limit_s, False
         self._out = str(place.out)
         self.process = subprocess.Popen(
             [str(python), *words(worker, job, place)],
             cwd=ROOT,
-            env=_environment(place),
+            env=environment,
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=log,
@@ -75,6 +57,7 @@ class Speaker:
     def ask(self, word: str) -> dict:
         """Sends a word and returns the answer."""
         assert self.process.stdin
+        self._asked_s = time.perf_counter()
         try:
             self.process.stdin.write(f"{word}\n")
             self.process.stdin.flush()
@@ -86,17 +69,38 @@ class Speaker:
         """Returns the next message.
 
         Raises:
-            FailedError: the worker ended.
+            FailedError: the worker ended, or its limit is over.
         """
         assert self.process.stdout
-        for line in self.process.stdout:
-            if line.startswith(MARK):
-                return json.loads(line.removeprefix(MARK))
+        with self._limited():
+            for line in self.process.stdout:
+                if line.startswith(MARK):
+                    return json.loads(line.removeprefix(MARK))
+        if self._late:
+            raise FailedError(f"no answer in {self._limit_s:g} s")
         raise FailedError(self._last_words())
 
     def age_s(self) -> float:
         """Returns the time since the process was started [s]."""
         return time.perf_counter() - self.began_s
+
+    @contextmanager
+    def _limited(self) -> Iterator[None]:
+        """Kills the worker when its limit is over."""
+        rest_s = self._asked_s + self._limit_s - time.perf_counter()
+        if rest_s == float("inf"):
+            yield
+            return
+        timer = threading.Timer(max(rest_s, LATE_S), self._give_up)
+        timer.start()
+        try:
+            yield
+        finally:
+            timer.cancel()
+
+    def _give_up(self) -> None:
+        self._late = True
+        self.process.kill()
 
     def _last_words(self) -> str:
         self.process.wait()
@@ -113,8 +117,16 @@ class Speaker:
 @contextmanager
 def speaking(worker: Worker, job: Job, place: Place) -> Iterator[Speaker]:
     """Runs a worker and ends it afterwards, whatever happens."""
-    with tempfile.TemporaryFile("w+", errors="replace") as log:
-        speaker = Speaker(worker, job, place, log)
+    path = place.log(job, worker)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with (
+        tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as fresh,
+        path.open("w+", encoding="utf-8", errors="replace") as log,
+    ):
+        given = place.environment(worker)
+        if job.kind == "start":
+            given |= {name: str(Path(fresh, name)) for name in FRESH}
+        speaker = Speaker(worker, job, place, log, given)
         try:
             yield speaker
         finally:
@@ -129,10 +141,3 @@ def words(worker: Worker, job: Job, place: Place) -> list[str]:
     given += ["--device", place.device, "--mjcf", str(place.mjcf)]
     own = place.out / "written" / job.name / worker.module
     return ["-m", module, *given, "--out", str(own), *worker.options]
-
-
-def _environment(place: Place) -> dict[str, str]:
-    given = {name: x for name, x in os.environ.items() if name not in CACHES}
-    # Peers share the GPU's memory while they take turns.
-    given |= {"XLA_PYTHON_CLIENT_PREALLOCATE": "false", "WANDB_MODE": "disabled"}
-    return given | ({"CUDA_VISIBLE_DEVICES": ""} if place.device == "cpu" else {})

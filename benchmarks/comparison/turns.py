@@ -5,8 +5,9 @@ from contextlib import ExitStack
 
 from benchmarks.comparison.figures import Figure, Found, interval, none
 from benchmarks.comparison.peers import CannotInstallError
+from benchmarks.comparison.place import Place
 from benchmarks.comparison.plan import Job
-from benchmarks.comparison.process import FailedError, Place, Speaker, speaking
+from benchmarks.comparison.process import FailedError, Speaker, speaking
 
 ROUNDS = 7
 

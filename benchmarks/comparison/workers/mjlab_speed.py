@@ -14,7 +14,7 @@ def main() -> None:
     args = arguments()
     device = "cpu" if args.device == "cpu" else "cuda:0"
     env = make_env(args.mjcf, args.worlds, device, args.seed)
-    repeat = STEPS_PER_CALL if args.device == "cpu" else 50
+    repeat = STEPS_PER_CALL[args.device]
 
     def call() -> int:
         with torch.inference_mode():

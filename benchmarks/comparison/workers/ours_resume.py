@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.comparison.plan import ours
 from benchmarks.comparison.workers.report import (
     DIFFERENCE,
     EXPORT,
@@ -43,7 +44,7 @@ def main() -> None:
     alike = sum(one[k].tobytes() == two[k].tobytes() for k in one)
     note = f"kill -9 after {HALF} of {2 * HALF} iterations; of {len(one)} arrays of the"
     note += f" checkpoint {alike} are alike bit for bit; largest of all"
-    shared = {"peer": "fingers_mjx (C MuJoCo)", "unit": "1"}
+    shared = {"peer": ours("ours_resume", args.backend).peer, "unit": "1"}
     shared["version"] = f"jax {version('jax')}, brax {version('brax')}"
     say(quantity=DIFFERENCE, value=apart, note=note, **shared)
     report = export_run(whole, args.out / "bundle")

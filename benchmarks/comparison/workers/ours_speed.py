@@ -16,7 +16,7 @@ def main() -> None:
     fix_rounding()
     args = arguments()
     batch = make_batch("crawl", args.worlds, backend=args.backend)
-    repeat = STEPS_PER_CALL if args.device == "cpu" else 50
+    repeat = STEPS_PER_CALL[args.device]
     layer: Any = environment(batch, repeat)
 
     def call() -> int:

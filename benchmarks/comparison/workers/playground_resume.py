@@ -6,6 +6,7 @@ from importlib.metadata import version
 import jax
 import numpy as np
 
+from benchmarks.comparison.plan import playground
 from benchmarks.comparison.workers.playground_hand import HandStand
 from benchmarks.comparison.workers.playground_train import train
 from benchmarks.comparison.workers.report import DIFFERENCE, arguments, largest, say
@@ -31,7 +32,8 @@ def main() -> None:
     about = f"playground {version('playground')}, brax {version('brax')}"
     note = f"Brax's checkpoint restored after {HALF} of {2 * HALF} iterations; it holds"
     note += " networks and normalizer, neither optimizer, worlds nor random key"
-    shared = {"peer": "MuJoCo Playground, Brax PPO", "version": about, "unit": "1"}
+    peer = playground("playground_resume", args.backend).peer
+    shared = {"peer": peer, "version": about, "unit": "1"}
     apart = largest(whole, rest)
     say(quantity=DIFFERENCE, value=apart, note=note, **shared)
     say(done=True)
