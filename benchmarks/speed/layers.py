@@ -1,5 +1,6 @@
 """The layers above bare physics: through JAX, the complete environment, PPO."""
 
+from collections.abc import Callable
 from typing import Any
 
 import jax
@@ -11,6 +12,8 @@ from envs.batch import BatchEnv
 ACTION_STD = 0.3
 MOVING = "bare, moving"
 """The layer of bare physics whose hands move; not for the backend jax."""
+Build = Callable[[BatchEnv, int], Layer]
+"""Makes a layer of so many control steps a call."""
 
 
 def bare_physics(batch: BatchEnv, repeat: int, action_std: float = 0.0) -> Layer:
@@ -86,16 +89,37 @@ def ppo(batch: BatchEnv, repeat: int) -> Layer:
     return Layer(call, config.unroll_length)
 
 
+def by_substep(layer: Build) -> Build:
+    """The same layer with more calls from JAX into Warp."""
+
+    def build(batch: BatchEnv, repeat: int) -> Layer:
+        call_by_substep(batch)
+        return layer(batch, repeat)
+
+    return build
+
+
+def call_by_substep(batch: BatchEnv) -> None:
+    """Makes JAX call Warp once a physics step, not once a control step."""
+    env: Any = batch.env
+    env.physics.calls = "substep"
+
+
 def _backend(batch: BatchEnv) -> str:
     """Returns the name of the backend of an environment."""
     env: Any = batch.env
     return getattr(env.physics, "impl", "cpu")
 
 
-LAYERS = {
+LAYERS: dict[str, Build] = {
     "bare physics": bare_physics,
     MOVING: bare_moving,
     "physics through JAX": through_jax,
     "environment": environment,
     "PPO": ppo,
 }
+BY_SUBSTEP: dict[str, Build] = {
+    f"{name} by substep": by_substep(LAYERS[name])
+    for name in ("physics through JAX", "environment", "PPO")
+}
+"""Layers only of the backend warp, and only where they are asked for."""

@@ -23,6 +23,7 @@ os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 
 import jax
 
+from benchmarks.speed.layers import call_by_substep
 from benchmarks.speed.throughput import machine, versions
 from envs.physics.backends import BACKENDS, default_backend
 from fingers_mjx.ppo.config import PRESETS, preset
@@ -39,17 +40,20 @@ class Timed:
         members: learners, of seeds 0, 1, ….
         worlds: of each.
         setup: settings of all.
+        by_substep: whether JAX calls Warp once a physics step.
 
     Attributes:
         first_s: time to the end of the first iteration [s].
     """
 
-    def __init__(self, members: int, worlds: int, setup: Setup):
+    def __init__(self, members: int, worlds: int, setup: Setup, by_substep: bool):
         begin_s = time.monotonic()
         train = dataclasses.replace(setup.train, num_envs=worlds)
         setup = dataclasses.replace(setup, train=train)
         setups = [with_seed(setup, seed) for seed in range(members)]
         env = make_env(setup, members * worlds, setup.train.backend)
+        if by_substep:
+            call_by_substep(env)
         self.session = Session(env, setups)
         self.carry = self.session.start()
         self.steps = members * train.steps_per_iteration
@@ -73,7 +77,7 @@ def main() -> None:
     sizes = [(int(s.partition("x")[0]), int(s.partition("x")[2])) for s in args.sizes]
     timed = []
     for members, worlds in sizes:
-        timed.append(Timed(members, worlds, setup))
+        timed.append(Timed(members, worlds, setup, args.by_substep))
         print(f"{members}x{worlds}: first after {timed[-1].first_s:.0f} s", flush=True)
     rates: list[list[float]] = [[] for _ in sizes]
     for _ in range(ROUNDS):
@@ -105,6 +109,11 @@ def _arguments() -> argparse.Namespace:
     parser.add_argument("--backend", choices=BACKENDS, default=default_backend())
     parser.add_argument("--preset", choices=PRESETS, default="paper")
     parser.add_argument("--iterations", type=int, default=5, help="per round")
+    parser.add_argument(
+        "--by-substep",
+        action="store_true",
+        help="warp: a call from JAX for each physics step, not each control step",
+    )
     parser.add_argument("--json", type=Path)
     return parser.parse_args()
 

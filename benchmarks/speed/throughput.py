@@ -9,6 +9,7 @@ MuJoCo Warp replaying a CUDA graph for warp, a scan of `mjx.step` for jax. Hands
 in the stance, or near it; small random actions move them in the environment and in
 PPO, and also in "bare, moving". Each number is the median over calls. On warp each
 layer has a process of its own, one after the other; elsewhere they take turns in one.
+Layers "... by substep" call Warp once a physics step instead of once a control step.
 """
 
 import argparse
@@ -29,7 +30,7 @@ import jax
 import mujoco
 
 from benchmarks.speed.bare import Layer
-from benchmarks.speed.layers import LAYERS, MOVING
+from benchmarks.speed.layers import BY_SUBSTEP, LAYERS, MOVING
 from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 from envs.rounding import fix_rounding
@@ -53,7 +54,7 @@ def main() -> None:
     rates, notes = measure(args, wanted, worlds)
     for key, rate in rates.items():
         backend, name = key
-        line = f"{backend:5} {name:20} {rate:12,.0f} control steps/s  {notes[key]}"
+        line = f"{backend:5} {name:30} {rate:12,.0f} control steps/s  {notes[key]}"
         print(line.rstrip(), flush=True)
     ratios = _ratios(rates, args.backend, args.against)
     for name, ratio in ratios.items():
@@ -77,7 +78,12 @@ def _arguments() -> argparse.Namespace:
     )
     parser.add_argument("--num-envs", type=int, help="default: warp 8192, else 256")
     parser.add_argument("--seconds", type=float, default=5.0, help="per layer")
-    parser.add_argument("--layers", nargs="*", choices=LAYERS, help="default: all")
+    parser.add_argument(
+        "--layers",
+        nargs="*",
+        choices=[*LAYERS, *BY_SUBSTEP],
+        help="default: all but those by substep",
+    )
     parser.add_argument("--json", type=Path)
     return parser.parse_args()
 
@@ -117,10 +123,11 @@ def _build(task: str, worlds: int, backend: str, name: str) -> Layer:
     """Makes a layer and calls it once, which compiles it."""
     repeat = 4 if backend == "jax" and jax.default_backend() == "cpu" else 20
     start = time.perf_counter()
-    layer: Layer = LAYERS[name](make_batch(task, worlds, backend=backend), repeat)
+    build = (LAYERS | BY_SUBSTEP)[name]
+    layer = build(make_batch(task, worlds, backend=backend), repeat)
     layer.call()
     seconds = time.perf_counter() - start
-    print(f"{backend:5} {name:20} ready after {seconds:.1f} s", flush=True)
+    print(f"{backend:5} {name:30} ready after {seconds:.1f} s", flush=True)
     return layer
 
 

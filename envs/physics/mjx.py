@@ -1,5 +1,7 @@
 """MuJoCo in JAX: MJX in pure JAX on any device, or MuJoCo Warp called from JAX."""
 
+import copy
+import hashlib
 from typing import Any, Literal
 
 import flax.struct
@@ -17,9 +19,12 @@ from envs.physics.base import (
     PhysicsState,
     check_model,
     nan_if_diverged,
+    nominal_field,
 )
 from envs.physics.quiet_mjx import mjx
+from envs.physics.warp_call import make_control_step
 from envs.physics.warp_kernels import compile_ahead
+from envs.physics.warp_layout import Sizes
 
 
 class MjxPhysics:
@@ -35,6 +40,9 @@ class MjxPhysics:
             also of geom pairs that pass the broad phase (Warp only).
         constraints_per_world: most constraint rows of one world: limits, friction
             losses and contacts (Warp only).
+        calls: what one call from JAX into Warp does, a whole control step or one
+            physics step by `mjx.step`; the results are the same. The latter, with which
+            benchmarks and tests compare, costs the host more (Warp only).
 
     Raises:
         InputError: the model uses what `impl` does not implement, or Warp is missing.
@@ -49,21 +57,24 @@ class MjxPhysics:
         num_worlds: int = 1,
         contacts_per_world: int = 48,
         constraints_per_world: int = 128,
+        calls: Literal["control_step", "substep"] = "control_step",
     ):
         check_model(mj_model, n_substeps)
         self.mj_model, self.n_substeps, self.impl = mj_model, n_substeps, impl
-        sizes: Any = {}
+        self.calls = calls if impl == "warp" else "substep"
+        room: Any = {}
         if impl == "warp":
             _check_warp()
             if jax.default_backend() == "gpu":
                 compile_ahead()
-            sizes = {
+            room = {
                 "naconmax": num_worlds * contacts_per_world,
                 "njmax": constraints_per_world,
             }
+            self._whole = make_control_step(_sizes_of(mj_model, n_substeps, room))
         try:
             model = mjx.put_model(mj_model, impl=impl)
-            data = mjx.make_data(mj_model, impl=impl, **sizes)
+            data = mjx.make_data(mj_model, impl=impl, **room)
         except NotImplementedError as error:
             valid = f"a model of features in backend {impl}, or the backend cpu"
             raise InputError("model", "", error, valid) from error
@@ -91,7 +102,18 @@ class MjxPhysics:
             MuJoCo documentation, Computation and MuJoCo XLA.
         """
         if self.impl == "warp":
-            _check_batchable(fields)
+            _check_batchable(self.mj_model, fields)
+        advance = self._by_substeps if self.calls == "substep" else self._whole
+        output = advance(fields, state, ctrl)
+        return nan_if_diverged(output.replace(overflow=self._lost(output.overflow)))
+
+    def _by_substeps(
+        self,
+        fields: ModelFields,
+        state: PhysicsState,
+        ctrl: Float[Array, "substeps nu"],
+    ) -> PhysicsOutput:
+        """Returns what `mjx.step` makes of each substep."""
         blind, model = _with(self._blind, fields), _with(self._model, fields)
 
         # Warp replays a recorded CUDA graph when it finds its buffers at the addresses
@@ -108,11 +130,11 @@ class MjxPhysics:
         data, _ = jax.lax.scan(substep, start, ctrl[:-1], length=self.n_substeps - 1)
         data = _mj_step(model, data.replace(ctrl=ctrl[-1]))
         after = PhysicsState(data.qpos, data.qvel, data.qacc_warmstart)
-        return nan_if_diverged(
-            PhysicsOutput(after, data.sensordata, self._overflow(data))
-        )
+        none = jnp.zeros((), jnp.int32)
+        overflow = data._impl.overflow if self.impl == "warp" else none
+        return PhysicsOutput(after, data.sensordata, overflow)
 
-    def _overflow(self, data: Any) -> Array:
+    def _lost(self, overflow: Array) -> Array:
         """Returns the buffer overflows of all substeps of a control step.
 
         Warp ORs its bits into the Data, which is fresh in each control step. It also
@@ -120,10 +142,23 @@ class MjxPhysics:
         and C MuJoCo and MJX say nothing about it either.
         """
         if self.impl != "warp":
-            return jnp.zeros((), jnp.int32)
-        overflow = _overflow_type()
-        solver = int(overflow.ITERATIONS | overflow.LS_ITERATIONS)
-        return data._impl.overflow & ~solver
+            return overflow
+        kinds = _overflow_type()
+        return overflow & ~int(kinds.ITERATIONS | kinds.LS_ITERATIONS)
+
+
+def _sizes_of(mj_model: mujoco.MjModel, n_substeps: int, room: dict[str, int]) -> Any:
+    """Returns what `make_control_step` asks for, of the model as it is now."""
+    model = copy.copy(mj_model)
+    contents = np.empty(mujoco.mj_sizeModel(model), np.uint8)
+    mujoco.mj_saveModel(model, None, contents)
+    digest = hashlib.sha256(contents.tobytes()).digest()
+
+    def sizes_of(worlds: int, names: tuple[str, ...]) -> Sizes:
+        fields = tuple((name, np.shape(nominal_field(model, name))) for name in names)
+        return Sizes(digest, worlds, n_substeps, fields, mj_model=model, **room)
+
+    return sizes_of
 
 
 def _with(model: Any, fields: ModelFields) -> Any:
@@ -195,8 +230,8 @@ def _overflow_type() -> Any:
     return OverflowType
 
 
-def _check_batchable(fields: ModelFields) -> None:
-    """Refuses fields that Warp reads once for all worlds.
+def _check_batchable(mj_model: mujoco.MjModel, fields: ModelFields) -> None:
+    """Refuses fields that Warp reads once for all worlds, and those of integers.
 
     Under vmap it would take the worlds' axis of such a field for one of its own.
     """
@@ -204,7 +239,8 @@ def _check_batchable(fields: ModelFields) -> None:
 
     batchable = types._BATCH_DIM["Model"]
     for name in fields:
-        if not batchable.get(name.replace(".", "__"), False):
+        known = batchable.get(name.replace(".", "__"), False)
+        if not known or np.asarray(nominal_field(mj_model, name)).dtype.kind != "f":
             valid = "fields that MuJoCo Warp keeps per world, such as body_mass"
             raise InputError("physics fields", name, "a value per world", valid)
 
