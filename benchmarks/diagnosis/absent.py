@@ -20,7 +20,7 @@ from benchmarks.diagnosis.hidden.conditions import Conditions
 from benchmarks.diagnosis.plan import NEEDS_COMPANY, Task
 from benchmarks.diagnosis.score import Row
 
-RIVALS: Mapping[str, str] = {
+IN_ITS_PLACE: Mapping[str, str] = {
     "armature": "payload_com",
     "asymmetric_friction": "stribeck_friction",
     "asymmetric_viscous": "supply_sag",
@@ -64,13 +64,13 @@ MAGNITUDE = "strong"
 
 
 def absent_tasks(seed: int = SEED) -> list[tuple[str, Task]]:
-    """Returns each effect that is absent, with a record of its rival; two of each.
+    """Returns each effect that is absent, with a record of what is hidden in its place; two of each.
 
     Args:
         seed: of the records.
     """
     tasks = []
-    for number, (absent, hidden) in enumerate(sorted(RIVALS.items())):
+    for number, (absent, hidden) in enumerate(sorted(IN_ITS_PLACE.items())):
         rig = NEEDS_COMPANY if absent == "joint_coupling" else "pendulum"
         for offset, effort in enumerate((True, False)):
             conditions = Conditions(
@@ -115,7 +115,7 @@ def main() -> None:
     """Runs from the command line."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
-    parser.add_argument("--only", nargs="+", default=list(RIVALS), choices=RIVALS)
+    parser.add_argument("--only", nargs="+", default=list(IN_ITS_PLACE), choices=IN_ITS_PLACE)
     parser.add_argument("--out", type=Path, default=Path("absent"))
     args = parser.parse_args()
     wanted = [(a, task) for a, task in absent_tasks() if a in args.only]

@@ -21,12 +21,8 @@ from rewards.pushing import (
     object_reached,
     object_regress,
 )
-from rewards.schedules import GeometricDecay
 from rewards.tables.crawl import CRAWL
 from rewards.tracking import track_yaw_rate
-
-_STRAIN = GeometricDecay(start=-0.1, ratio=10.0, hold_steps=0, decay_steps=12_000)
-"""Weight of what would be stopped: it grows."""
 
 _WALK: RewardTable = tuple(row for row in CRAWL if row.name != "track_yaw_rate")
 
@@ -37,8 +33,8 @@ PUSH: RewardTable = (
     RewardTerm("object_at_target", object_at_target, 3.0, ("target_error_m",)),
     RewardTerm("object_delivered", object_delivered, 1.0, ("target_error_m",)),
     RewardTerm("fallen", precomputed, -500.0, ("fallen",)),
-    RewardTerm("overload", overload, _STRAIN, ("effort_share",)),
-    RewardTerm("target_lag", target_lag, _STRAIN, ("joint_lag_rad",)),
+    RewardTerm("overload", overload, -1.0, ("effort_share",)),
+    RewardTerm("target_lag", target_lag, -1.0, ("joint_lag_rad",)),
     RewardTerm("track_yaw_rate", track_yaw_rate, 0.5, ("angvel_v", "command")),
     *_WALK,
 )

@@ -4,7 +4,7 @@ import dataclasses
 
 import pytest
 
-from benchmarks.diagnosis.absent import RIVALS, absent_tasks, table, wins
+from benchmarks.diagnosis.absent import IN_ITS_PLACE, absent_tasks, table, wins
 from benchmarks.diagnosis.battery import run_task
 from benchmarks.diagnosis.plan import CATALOGUE
 from benchmarks.diagnosis.score import Row
@@ -24,7 +24,7 @@ HIDDEN = Row(
 
 
 def test_every_effect_is_absent_in_two_records():
-    assert set(RIVALS) == set(CATALOGUE)
+    assert set(IN_ITS_PLACE) == set(CATALOGUE)
     pairs = absent_tasks()
     assert all(a not in task.effects for a, task in pairs)
     assert len({task.seed for _, task in pairs}) == 2 * len(CATALOGUE)
