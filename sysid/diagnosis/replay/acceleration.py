@@ -1,7 +1,7 @@
 """The command of a servo that keeps to an acceleration, from message to message.
 
 To a goal that is held the profile is exact at any time. Behind a low-pass the goal
-moves on: it is held at its middle for as long as a servo takes to look at it again.
+moves on: it is held at its middle for half a millisecond at a time.
 """
 
 import math
@@ -15,7 +15,7 @@ from jaxtyping import Array, Float
 from envs.actuator.effects.acceleration_limit import profiled
 from envs.actuator.effects.lowpass_cutoff import filtered
 
-PART_S = 0.001
+PART_S = 0.0005
 """Longest time for which a goal behind a low-pass is held [s]."""
 
 Pair = tuple[Float[Array, "*#c"], Float[Array, "*#c"]]
