@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from envs.actuator.effect import EffectKind
 from envs.actuator.effects import (
+    acceleration_limit,
     armature,
     asymmetric_friction,
     asymmetric_viscous,
@@ -54,6 +55,7 @@ _MODULES = (
     lowpass_cutoff,
     slew_limit,
     directional_slew,
+    acceleration_limit,  # takes the limits of the speed into its profile
     encoder_offset,
     encoder_scale,
     encoder_eccentricity,

@@ -97,8 +97,12 @@ def _signals(joint: JointInput) -> Substep:
     given = (joint.kp, joint.kd, joint.load)
     kp, kd, load = (jnp.broadcast_to(x, shape) for x in given)
     none = jnp.zeros_like(joint.q)
+    free = jnp.full_like(none, jnp.inf)
     return Substep(
         command=joint.target,
+        goal=joint.target,
+        rising=free,
+        falling=free,
         q=joint.q,
         qd=joint.qd,
         encoder=joint.q,
@@ -122,6 +126,8 @@ def _signals(joint: JointInput) -> Substep:
 
 def _servo(stage: Stage, x: Substep) -> Substep:
     """What happens without effects just before those of a stage act."""
+    if stage is Stage.PROFILE:
+        return x.replace(goal=x.command)
     if stage is Stage.ERROR:
         return x.replace(error=x.command - x.encoder)
     if stage is Stage.TORQUE:

@@ -27,6 +27,8 @@ class Substep:
 
     Attributes:
         command: what the servo follows [rad]; first the target.
+        goal: where the command goes, before limits of its speed [rad].
+        rising, falling: largest speeds of the command up and down [rad/s].
         q, qd: joint angle [rad] and speed [rad/s] of the physics.
         encoder, encoder_speed: what the servo's encoder measures [rad], [rad/s].
         error: command − encoder, as the servo weighs it [rad].
@@ -47,6 +49,9 @@ class Substep:
     """
 
     command: Float[Array, "*j"]
+    goal: Float[Array, "*j"]
+    rising: Float[Array, "*j"]
+    falling: Float[Array, "*j"]
     q: Float[Array, "*j"]
     qd: Float[Array, "*j"]
     encoder: Float[Array, "*j"]
@@ -72,6 +77,7 @@ class Stage(enum.Enum):
 
     LOAD = "load"
     COMMAND = "command"
+    PROFILE = "profile"
     ENCODER = "encoder"
     GAINS = "gains"
     ERROR = "error"

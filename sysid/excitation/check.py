@@ -26,6 +26,8 @@ from sysid.mechanism import (
 STEP_S = 0.001
 _SHRINK = 0.75
 _MAX_ROUNDS = 12
+_COMMANDS = frozenset((Stage.COMMAND, Stage.PROFILE))
+"""Stages at which a target becomes what the servo follows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +144,7 @@ def _path(names, values, held):
     model = [
         (effect_kind(name), parameters)
         for name, parameters in zip(names, values, strict=True)
-        if Stage.COMMAND in effect_kind(name).acts
+        if not _COMMANDS.isdisjoint(effect_kind(name).acts)
     ]
     zero = jnp.zeros(())
 

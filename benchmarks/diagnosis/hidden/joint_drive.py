@@ -15,8 +15,9 @@ PRESLIDING_RAD = 2e-4
 class JointDrive:
     """Command path, servo and friction of one joint with their states.
 
-    The low-pass is the trapezoidal rule of its differential equation; dry friction is
-    a slipping spring, hysteresis a row of Jenkins elements, warmth a heat balance.
+    The low-pass is the trapezoidal rule of its differential equation; a profile brakes
+    as late as whole steps allow; dry friction is a slipping spring, hysteresis a row of
+    Jenkins elements, warmth a heat balance.
     """
 
     def __init__(
@@ -33,6 +34,8 @@ class JointDrive:
         self.slew = min(value("slew_limit", "speed_rad_s", math.inf), joint.slew_rad_s)
         self.up = value("directional_slew", "up_rad_s", math.inf)
         self.down = value("directional_slew", "down_rad_s", math.inf)
+        self.jolt = h * value("acceleration_limit", "acceleration_rad_s2", math.inf)
+        self.pace = 0.0
         self.grid = value("command_quantization", "step_rad", 0.0)
         self.kp = joint.kp * value("stiffness", "scale", 1.0)
         self.kd = joint.kd * value("damping", "scale", 1.0)
@@ -89,7 +92,7 @@ class JointDrive:
         self.filtered = self.pole * self.filtered + mean if self.smooths else target
         self.input = target
         up, down = (self.h * min(self.slew, x) for x in (self.up, self.down))
-        self.command += min(max(self.filtered - self.command, -down), up)
+        self.command += self._stride(self.filtered - self.command, up, down)
         error = self.command - self.encoder(q)
         if self.zone:
             error -= min(max(error, -self.zone), self.zone)
@@ -106,6 +109,22 @@ class JointDrive:
         if self.heat:
             self.warmth += self.h * (self.heat * torque**2 - self.cool * self.warmth)
         return torque
+
+    def _stride(self, away: float, up: float, down: float) -> float:
+        """The next step of the command towards a goal that is so far away [rad].
+
+        A way of n steps, each slower than the one before by d, is d n (n + 1) / 2 long:
+        the longest first step of a way x that can still be braked is d n with that n.
+        """
+        if math.isinf(self.jolt):
+            return min(max(away, -down), up)
+        change = self.jolt * self.h
+        steps = math.sqrt(0.25 + 2.0 * abs(away) / change) - 0.5
+        # A way that is no whole number of steps is left for the last of them.
+        wanted = min(change * steps, abs(away), up if away > 0.0 else down)
+        wanted = math.copysign(wanted, away)
+        self.pace = min(max(wanted, self.pace - change), self.pace + change)
+        return self.pace
 
     def _asked(self, error: float, speed: float) -> float:
         """Torque by the servo's law [N·m]; of a cascade by its two loops."""

@@ -82,6 +82,14 @@ def _one_way(mechanism, joint, size, rng):
     return mechanism.with_effect(joint, "directional_slew", **{way: speed})
 
 
+def _gentle(mechanism, joint, size, rng):
+    """As if a speed of 8 rad/s took 0.02 s at size 1."""
+    acceleration = 8.0 / (0.02 * size)
+    return mechanism.with_effect(
+        joint, "acceleration_limit", acceleration_rad_s2=acceleration
+    )
+
+
 def _slope(mechanism, joint, size, rng):
     """As if the error could grow by 20 rad/s at size 1."""
     slope = 20.0 * mechanism.joints[joint].kp / size
@@ -196,6 +204,7 @@ SCALES: dict[str, Scale] = {
         1.2,
     ),
     "directional_slew": Scale(_one_way, 1.0, 40.0, "slew_rad_s", 1.2),
+    "acceleration_limit": Scale(_gentle, 0.1, 400.0),
     "torque_slope_limit": Scale(_slope, 1e-2, 1e3),
     "stiffness": Scale(_effect("stiffness", scale=_factor), 1e-2, 1.2, "kp", 0.2),
     "damping": Scale(_effect("damping", scale=_factor), 1e-2, 1.2, "kd", 0.4),

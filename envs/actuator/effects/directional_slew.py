@@ -25,10 +25,11 @@ def towards(
 
 
 def _act(params: Params, last, x, dt):
-    gap = x.command - last
-    reach = towards(gap, params["up_rad_s"], params["down_rad_s"]) * dt
+    gap, up, down = x.command - last, params["up_rad_s"], params["down_rad_s"]
+    reach = towards(gap, up, down) * dt
     command = last + jnp.clip(gap, -reach, reach)
-    return command, x.replace(command=command)
+    rising, falling = jnp.minimum(x.rising, up), jnp.minimum(x.falling, down)
+    return command, x.replace(command=command, rising=rising, falling=falling)
 
 
 _SPEED = Parameter("rad/s", 0.05, 50.0, lognormal(3.0, 2.0), identity=float("inf"))
@@ -37,8 +38,10 @@ EFFECT = EffectKind(
     name="directional_slew",
     equation="−v₋ ≤ ċ ≤ v₊",
     parameters={"up_rad_s": _SPEED, "down_rad_s": _SPEED},
-    acts={Stage.COMMAND: _act},
+    acts={Stage.PROFILE: _act},
     confusable_with={
+        "acceleration_limit": "steps of two sizes, both ways: a speed limit's slope is "
+        "the same from the first moment",
         "slew_limit": "steps both ways: one limit is the same in both",
         "asymmetric_viscous": "effort at constant speed: friction needs it",
         "torque_limit": "effort: flat at a torque limit, small at a speed limit",

@@ -49,6 +49,7 @@ EFFECT = EffectKind(
     acts={Stage.COMMAND: _act},
     confusable_with={
         "transport_delay": "steps: a filter moves at once; chirp: its gain falls",
+        "acceleration_limit": "steps of two sizes: a filter takes as long for both",
         "slew_limit": "steps of two sizes: a filter scales with the size",
         "damping": "set the firmware's filter to another cutoff: the estimate follows",
         "viscous_friction": "set the firmware's filter to another cutoff",

@@ -28,8 +28,10 @@ def limited(
 
 
 def _act(params: Params, last, x, dt):
-    command = limited(last, x.command, params["speed_rad_s"], dt)
-    return command, x.replace(command=command)
+    speed = params["speed_rad_s"]
+    command = limited(last, x.command, speed, dt)
+    rising, falling = (jnp.minimum(v, speed) for v in (x.rising, x.falling))
+    return command, x.replace(command=command, rising=rising, falling=falling)
 
 
 EFFECT = EffectKind(
@@ -40,8 +42,10 @@ EFFECT = EffectKind(
             "rad/s", 0.05, 50.0, lognormal(3.0, 2.0), identity=float("inf")
         )
     },
-    acts={Stage.COMMAND: _act},
+    acts={Stage.PROFILE: _act},
     confusable_with={
+        "acceleration_limit": "steps of two sizes: only at a limit of the speed is the "
+        "middle of a large one a ramp of the same slope",
         "directional_slew": "steps both ways: one limit is the same in both",
         "lowpass_cutoff": "steps of two sizes: the slope of a limit stays the same",
         "torque_limit": "effort: flat at a torque limit, small at a speed limit",

@@ -23,6 +23,7 @@ EFFECT = EffectKind(
     acts={Stage.TORQUE: _act},
     confusable_with={
         "slew_limit": "effort: flat at a torque limit, small at a speed limit",
+        "acceleration_limit": "effort: flat at a torque limit, else that of the motion",
         "directional_slew": "effort: flat at a torque limit, small at a speed limit",
         "supply_sag": "bus voltage, or one joint alone against all together",
         "thermal_derating": "cold against warm: a limit does not drift",

@@ -61,6 +61,8 @@ EFFECT = EffectKind(
     acts={Stage.COMMAND: _act},
     confusable_with={
         "lowpass_cutoff": "steps: dead time before any motion; chirp: gain stays flat",
+        "acceleration_limit": "steps of two sizes: the lag of a limit grows with the "
+        "size",
         "slew_limit": "steps of two sizes: the lag of a limit grows with the size",
         "sensor_latency": "an event seen by another clock, e.g. a hit",
         "armature": "chirp: inertia bends the gain",

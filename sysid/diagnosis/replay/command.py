@@ -20,6 +20,7 @@ from envs.actuator.effects.command_quantization import quantized
 from envs.actuator.effects.directional_slew import towards
 from envs.actuator.effects.lowpass_cutoff import filtered
 from envs.actuator.effects.slew_limit import limited
+from sysid.diagnosis.replay.acceleration import Limits, way_to
 
 EFFECTS = (
     "transport_delay",
@@ -27,6 +28,7 @@ EFFECTS = (
     "lowpass_cutoff",
     "slew_limit",
     "directional_slew",
+    "acceleration_limit",
     "sensor_latency",
     "clock_drift",
 )
@@ -66,7 +68,7 @@ def command_path(
     """Commands of candidates c at the steps of the grid: c(t) = path(t − T − L − d t).
 
     The path rounds targets to a grid, passes them through a low-pass and limits their
-    speed; see `envs.actuator.effects`.
+    speed and acceleration; see `envs.actuator.effects`.
 
     Args:
         held: the last targets before the end of every step, in their order [rad].
@@ -80,13 +82,36 @@ def command_path(
     Source:
         Ours; exact response of a first-order low-pass to held targets.
     """
+    if "acceleration_limit" in params:
+        # The profile takes longer than all the rest of the path.
+        limit = jnp.isfinite(params["acceleration_limit"]["acceleration_rad_s2"])
+        rest = {k: v for k, v in params.items() if k != "acceleration_limit"}
+        path, mean, ahead = jax.lax.cond(
+            jnp.any(limit),
+            lambda: _walk(held, sent, params, dt),
+            lambda: _walk(held, sent, rest, dt),
+        )
+    else:
+        path, mean, ahead = _walk(held, sent, params, dt)
+    steps = _steps_late(params, len(held), dt)
+    place = jnp.arange(len(path))[:, None] - jnp.round(steps)
+    place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
+    ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
+    late = [_late(x, steps) for x in (path, mean, _ripple(path, mean))]
+    return Commands(late[0], late[1], late[2], ahead)
+
+
+def _walk(held, sent, params: Params, dt: float) -> tuple[Array, Array, Array]:
+    """Path, mean and what is ahead, up to whole steps of the delays."""
     grid, age = _grid(params), _age(params, dt)
     cutoff = _value(params, "lowpass_cutoff", "cutoff_hz", jnp.inf)
-    speeds = _speeds(params)
+    limits = _limits(params)
+    speeds = limits.speeds
     lag_s = 1.0 / (2.0 * jnp.pi * cutoff)
+    gentle = "acceleration_limit" in params
 
     def step(carry, row):
-        smooth, command = carry
+        smooth, command, *rate = carry
         targets, times = row
         begin = _begins(times, age)
         begin = begin.at[0].set(0.0)
@@ -104,22 +129,24 @@ def command_path(
             command = _chosen(acts, moved, before)
             follows = (before == last) & (command == smooth)
             mean = goal - (smooth - last) * lag_s / h
-            total += part * jnp.where(follows, mean, 0.5 * (before + command))
-            h = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
-            there = filtered(last, goal, cutoff, h)
-            there = _pursuit(before, since, there, speeds, h)
+            mean = jnp.where(follows, mean, 0.5 * (before + command))
+            within = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
+            there = filtered(last, goal, cutoff, within)
+            there = _pursuit(before, since, there, speeds, within)
+            if gentle:
+                way = way_to((before, rate[0]), (last, goal, cutoff), limits, h, dt)
+                command = _chosen(acts & limits.act, way.command[1], command)
+                rate[0] = _chosen(acts & limits.act, way.speed[1], rate[0])
+                mean = _chosen(limits.act, way.mean, mean)
+                there = _chosen(limits.act, way.at(within / h), there)
+            total += part * mean
             passed += acts * (start < _WITHIN) * (there - passed)
-        return (smooth, command), (command, total, command - passed)
+        return (smooth, command, *rate), (command, total, command - passed)
 
     first = quantized(held[0, 0][:, None], grid)
     first = jnp.broadcast_to(first, (held.shape[2], len(age)))
-    path, mean, ahead = jax.lax.scan(step, (first, first), (held, sent))[1]
-    steps = _steps_late(params, len(held), dt)
-    place = jnp.arange(len(path))[:, None] - jnp.round(steps)
-    place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
-    ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
-    late = [_late(x, steps) for x in (path, mean, _ripple(path, mean))]
-    return Commands(late[0], late[1], late[2], ahead)
+    rest = [jnp.zeros_like(first)] if gentle else []
+    return jax.lax.scan(step, (first, first, *rest), (held, sent))[1]
 
 
 def held_command(
@@ -188,14 +215,16 @@ def _ripple(path: Float[Array, "t p c"], mean: Float[Array, "t p c"]):
     return 0.5 * (rest + jnp.concatenate([rest[1:], rest[-1:]]))
 
 
-def _speeds(params: Params) -> tuple[Float[Array, " c"], Float[Array, " c"]]:
-    """Largest speeds up and down [rad/s]."""
+def _limits(params: Params) -> Limits:
+    """Largest speeds up and down [rad/s], and acceleration [rad/s²]."""
     both = _value(params, "slew_limit", "speed_rad_s", jnp.inf)
     up, down = (
         _value(params, "directional_slew", f"{way}_rad_s", jnp.inf)
         for way in ("up", "down")
     )
-    return jnp.minimum(both, up), jnp.minimum(both, down)
+    acceleration = _value(params, "acceleration_limit", "acceleration_rad_s2", jnp.inf)
+    speeds = jnp.minimum(both, up), jnp.minimum(both, down)
+    return Limits(speeds, acceleration)
 
 
 def _pursuit(command, last, goal, speeds, h):

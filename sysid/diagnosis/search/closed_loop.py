@@ -124,6 +124,7 @@ def _simulated(
     driven: bool,
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side."""
+    params = {name: params[name] for name in program.effects}
     acting = [name for name in program.effects if name in KINDS]
     effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in acting}
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]

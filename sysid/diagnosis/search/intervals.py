@@ -92,19 +92,22 @@ def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:
         return BOUNCE * abs(u)
     if slot.effect == "payload_mass" and slot.nominal == 0.0:
         return slot.prior_sd
-    return _timing(slot, data)
+    return _timing(slot, u, data)
 
 
-def _timing(slot: Slot, data: JointTrack) -> float:
+def _timing(slot: Slot, u: float, data: JointTrack) -> float:
     """Standard error of a coordinate by a servo's cycle.
 
     A servo meets targets and limits in its own time, and rounds a filter to its cycle:
     the lag of its command path is uncertain by σ = `CYCLE_S`. That is a delay itself, a
-    time constant 1 / 2π f, the time A / v of a way at a limited speed, and the time
-    τ / S of a rise at a limited slope.
+    time constant 1 / 2π f, the time A / v of a way at a limited speed, the time
+    √(2 A / a) of one at a limited acceleration, and the time τ / S of a rise at a
+    limited slope.
     """
     if slot.name in ("delay_s", "latency_s"):
         return CYCLE_S / slot.scale
+    if slot.name == "acceleration_rad_s2":
+        return CYCLE_S * math.sqrt(4.0 * slot.scale * abs(u) / data.angle_scale)
     ways = {
         "cutoff_hz": 2.0 * math.pi,
         "speed_rad_s": 2.0 / data.angle_scale,

@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float
 from sysid.diagnosis.search.parameters import Space
 
 COSTLY = (
+    "acceleration_limit",
     "payload_com",
     "encoder_eccentricity",
     "torque_slope_limit",
@@ -25,7 +26,7 @@ COSTLY = (
 )
 """Effects that take longer than a tenth of a simulation each."""
 
-PATH = ("lowpass_cutoff", "slew_limit", "directional_slew")
+PATH = ("acceleration_limit", "lowpass_cutoff", "slew_limit", "directional_slew")
 """Effects with which the command depends on where it was."""
 
 MOST = 2
@@ -55,7 +56,7 @@ def programs(
         space: coordinates.
         thetas: coordinates of candidates [1].
     """
-    names = (*COSTLY, *PATH)
+    names = tuple(dict.fromkeys((*COSTLY, *PATH)))
     acting = np.stack([_acts(space, thetas, name) for name in names], 1)
     kinds = np.unique(acting, axis=0)
     costly = [kind for kind in kinds if kind[: len(COSTLY)].any()]
@@ -66,7 +67,7 @@ def programs(
         some = {name for name, there in zip(names, kind, strict=True) if there}
         effects = tuple(e for e in space.effects if e not in COSTLY or e in some)
         who = np.flatnonzero((acting == kind).all(1))
-        yield Program(effects, bool(kind[len(COSTLY) :].any())), who
+        yield Program(effects, bool(some.intersection(PATH))), who
 
 
 def _acts(space: Space, thetas: np.ndarray, effect: str) -> Bool[np.ndarray, " c"]:

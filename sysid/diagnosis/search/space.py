@@ -48,6 +48,8 @@ _STEP_RANGE = (0.015, 1.0)
 _RECIPROCAL = {
     "N·m": (1.0, 1.2, 1.6),
     "rad/s": (0.6, 0.9, 1.2, 1.8),
+    # From 0.02 to 1 s until the speed is that of the records.
+    "rad/s²": tuple(np.geomspace(0.2, 10.0, 14).tolist()),
     # A little too tight a limit is far worse than none: its optimum is narrow.
     "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
 }
@@ -135,6 +137,7 @@ def _sizes(track: JointTrack) -> dict[str, float]:
         "N·m": torque,
         "rad": 0.1 * angle,
         "rad/s": speed,
+        "rad/s²": speed / 0.1,
         "N·m·s/rad": torque / speed,
         "kg·m²": inertia,
         "N·m/s": torque / 0.03,

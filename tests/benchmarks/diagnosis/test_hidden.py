@@ -89,6 +89,18 @@ def test_command_path_by_its_step_response():
     slow = commands(servo(slew_limit={"speed_rad_s": 2.0}))
     assert np.max(np.diff(slow)) == pytest.approx(2.0 * 5e-4)
     assert np.argmax(slow > 0.999) * 5e-4 == pytest.approx(0.6, abs=0.002)
+    gentle = {"acceleration_limit": {"acceleration_rad_s2": 10.0}}
+    soft = commands(
+        servo(slew_limit={"speed_rad_s": 2.0}, lowpass_hz=math.inf, **gentle)
+    )
+    assert np.max(np.abs(np.diff(soft, 2))) == pytest.approx(10.0 * 5e-4**2)
+    assert np.max(np.diff(soft)) == pytest.approx(2.0 * 5e-4)
+    # 1 rad at 2 rad/s, and 0.2 s more to get there and to brake.
+    assert np.argmax(soft > 1.0 - 1e-6) * 5e-4 == pytest.approx(0.8, abs=0.002)
+    assert np.max(soft) < 1.0 + 1e-9
+    free = commands(servo(lowpass_hz=math.inf, **gentle))
+    top = np.max(np.diff(free)) / 5e-4
+    assert top == pytest.approx(math.sqrt(10.0), rel=0.01)
 
 
 def test_two_loops_hold_a_weight_and_keep_to_their_speed():

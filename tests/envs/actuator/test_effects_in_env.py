@@ -25,6 +25,7 @@ STEPS = 25
 SIZES = {
     "slew_limit": {"speed_rad_s": 0.2},
     "directional_slew": {"up_rad_s": 0.2, "down_rad_s": 0.4},
+    "acceleration_limit": {"acceleration_rad_s2": 2.0},
     "torque_limit": {"limit_nm": 0.03},
     "thermal_derating": {"loss_per_nm2": 1000.0, "time_constant_s": 1.0},
     "clock_drift": {"drift_ppm": 2000.0},

@@ -1,8 +1,10 @@
 """The command path without a low-pass: what acts when, at delays below a row too."""
 
+import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from support import effects_rig as rig
 
 from sysid.diagnosis.measured.resampling import held_targets
 from sysid.diagnosis.replay.command import command_path, held_command
@@ -78,6 +80,47 @@ def test_limits_of_both_directions_are_those_of_the_chain():
     alike = {"up_rad_s": jnp.array([2.0]), "down_rad_s": jnp.array([2.0])}
     one = path_at(0.4, targets, slew_limit=both)[0]
     assert path_at(0.4, targets, directional_slew=alike)[0] == pytest.approx(one)
+
+
+@pytest.mark.parametrize(("cutoff_hz", "most"), [(np.inf, 2e-4), (8.0, 3e-3)])
+def test_an_acceleration_is_that_of_the_chain(cutoff_hz, most):
+    """The path from message to message against steps of 50 µs of the chain; behind a
+    low-pass it is as near as a servo that looks every millisecond."""
+    rng = np.random.default_rng(2)
+    targets = np.repeat(rng.uniform(-0.6, 0.6, 8), 50) + 0.1 * np.sin(0.2 * ROWS)
+    effects = {
+        "lowpass_cutoff": {"cutoff_hz": jnp.array([cutoff_hz])},
+        "slew_limit": {"speed_rad_s": jnp.array([3.0])},
+        "acceleration_limit": {"acceleration_rad_s2": jnp.array([25.0])},
+    }
+    path, mean = path_at(0.0, targets, **effects)
+    fine = 200
+    sent = np.append(targets[0], np.repeat(targets, fine))
+    passed = rig.run(effects, sent[:, None], dt=DT / fine)[2].command[:, 0]
+    assert path[1:] == pytest.approx(passed[fine::fine][: len(path) - 1], abs=most)
+    means = passed[1:].reshape(-1, fine).mean(1)
+    assert mean[1:] == pytest.approx(means[: len(mean) - 1], abs=most)
+    plain = path_at(0.0, targets, **{k: effects[k] for k in list(effects)[:2]})[0]
+    assert np.max(np.abs(path - plain)) > 0.2
+
+
+def test_company_changes_no_candidate():
+    """With one that has an acceleration, those without have the path of before."""
+    targets = np.where(ROWS % 100 < 50, 1.0, 0.0)
+    slow = {"speed_rad_s": jnp.array([2.0, 2.0])}
+    limits = {"acceleration_rad_s2": jnp.array([jnp.inf, 10.0])}
+    held, sent = held_targets(DT * ROWS, targets, DT * ROWS, 4)
+    rows = jnp.array(held[..., None]), jnp.array(sent[..., None])
+    params = {"transport_delay": {"delay_s": jnp.full(2, 0.004)}, "slew_limit": slow}
+    both = command_path(*rows, params | {"acceleration_limit": limits}, DT)
+    plain = command_path(*rows, params, DT)
+    for a, b in zip(jax.tree.leaves(both), jax.tree.leaves(plain), strict=True):
+        assert np.asarray(a)[..., 0] == pytest.approx(np.asarray(b)[..., 0], abs=1e-6)
+    assert np.max(np.abs(both.path - plain.path)[..., 1]) > 0.05
+    none = {"acceleration_rad_s2": jnp.full(2, jnp.inf)}
+    absent = command_path(*rows, params | {"acceleration_limit": none}, DT)
+    for a, b in zip(jax.tree.leaves(absent), jax.tree.leaves(plain), strict=True):
+        assert np.asarray(a) == pytest.approx(np.asarray(b), abs=1e-6)
 
 
 @pytest.mark.parametrize("delay_rows", [0.0, 0.4, 2.7])
