@@ -66,7 +66,7 @@ MAGNITUDE = "strong"
 
 
 def absent_tasks(seed: int = SEED) -> list[tuple[str, Task]]:
-    """Returns each effect that is absent, with a record of what is hidden in its place; two of each.
+    """Returns each effect that is absent, with records of what is in its place.
 
     Args:
         seed: of the records.
