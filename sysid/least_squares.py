@@ -216,6 +216,7 @@ class _State:
         self.task, self.theta = task, np.clip(task.start, task.low, task.high)
         self.cost, self.r = np.inf, np.zeros(0)
         self.columns: dict[int, np.ndarray] = {}
+        self.own: set[int] = set()
         self.damping, self.done = 1e-3, False
 
     def enter(self, r: np.ndarray) -> None:
@@ -251,6 +252,7 @@ class _State:
         if costs[best] < self.cost:
             self.done = self.cost - costs[best] < 1e-5 * self.cost + 1e-2
             self.theta, self.r, self.cost = thetas[best], rs[best], costs[best]
+            self.own = set()
             self.damping = max(self.damping * _TRIED[best], 1e-7)
         else:
             self.done = self.damping > 1e3
@@ -264,10 +266,12 @@ class _State:
 
 
 def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
-    """Finds the Jacobians by forward or central differences."""
+    """Finds Jacobians by forward or central differences where fits have moved since."""
     rows, places = [], []
     for state in live:
         for i in state.task.free:
+            if i in state.own:
+                continue
             if i in shared and i not in state.task.fresh:
                 state.columns[i] = shared[i]
                 continue
@@ -277,6 +281,7 @@ def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
                 theta[i] += away
                 rows.append(theta)
             places.append((state, i, step))
+            state.own.add(i)
     found = iter(residual(np.stack(rows)) if rows else ())
     for state, i, step in places:
         ahead = next(found)

@@ -108,3 +108,17 @@ def test_what_the_data_do_not_show_has_no_error():
     fit = fit_all(residual, [task([0, 0, 0], deviation=2.0)])[0]
     errors, _ = standard_errors(fit, np.full(3, 2.0), np.arange(40))
     assert np.isnan(errors).tolist() == [False, False, True]
+
+
+def test_a_fit_that_does_not_move_keeps_its_jacobian():
+    """Its start is the optimum: slopes are found once, and no step helps."""
+    asked = []
+
+    def counted(thetas):
+        asked.append(len(thetas))
+        return linear(thetas)
+
+    best = np.linalg.lstsq(A, Y, rcond=None)[0]
+    fit = fit_all(counted, [task(best)], 4)[0]
+    assert fit.theta == pytest.approx(best)
+    assert asked.count(3) == 1 and fit.jacobian == pytest.approx(A, abs=1e-6)

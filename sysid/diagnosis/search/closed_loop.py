@@ -13,7 +13,7 @@ import flax.struct
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
@@ -25,6 +25,7 @@ from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.search.lanes import LANES, in_lanes, lanes_first
+from sysid.diagnosis.search.memory import Memory, remembered
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.programs import Program, programs
 
@@ -48,8 +49,11 @@ WINDOW_S = 0.5
 
 
 def simulated(
-    problem: Problem, thetas: Float[np.ndarray, "c n"]
-) -> Float[np.ndarray, "c t p"]:
+    problem: Problem,
+    thetas: Float[np.ndarray, "c n"],
+    rows: Int[np.ndarray, " m"] | slice = slice(None),
+    known: dict[Program, Memory] | None = None,
+) -> Float[np.ndarray, "c m p"]:
     """Encoder angles y of candidates, from measured starts, smoothed as the track is.
 
         (μ I + J) q̈ = τ + τ_load − b q̇ − F sign q̇,   y = f(q)
@@ -57,9 +61,11 @@ def simulated(
     Args:
         problem: the joint's track and coordinates.
         thetas: coordinates of candidates [1].
+        rows: steps of the grid that are asked for [steps].
+        known: what has been simulated of the same track and rows, by program; it grows.
 
     Returns:
-        y at the steps of the grid [rad].
+        y at those steps [rad].
 
     Source:
         Output error of the same model: L. Ljung, System Identification: Theory for the
@@ -74,13 +80,21 @@ def simulated(
     steps = len(problem.data.track.cmd)
     window = max(round(WINDOW_S / dt), 8) if driven else steps
     fixed = (dt / substeps, (means, substeps), window, driven)
+    known = {} if known is None else known
+
+    def angles(program: Program, some: np.ndarray) -> np.ndarray:
+        size = FEW_LANES if len(some) <= 2 * FEW_LANES else LANES
+        parts = []
+        for lanes, count in in_lanes(some, size):
+            values = problem.space.values(lanes)
+            out = _simulated(problem.data.track, *values, program, *fixed)
+            parts.append(lanes_first(out, count)[:, rows])
+        return np.concatenate(parts)
+
     parts, order = [], []
     for program, who in programs(problem.space, thetas):
-        few = len(who) <= 2 * FEW_LANES
-        for lanes, count in in_lanes(thetas[who], FEW_LANES if few else LANES):
-            values = problem.space.values(lanes)
-            angles = _simulated(problem.data.track, *values, program, *fixed)
-            parts.append(lanes_first(angles, count))
+        before = known.setdefault(program, {})
+        parts.append(remembered(before, thetas[who], partial(angles, program)))
         order.append(who)
     return np.concatenate(parts)[np.argsort(np.concatenate(order))]
 

@@ -1,0 +1,25 @@
+"""Candidates that were evaluated before are remembered."""
+
+import numpy as np
+
+from sysid.diagnosis.search import memory
+from sysid.diagnosis.search.memory import remembered
+
+
+def test_only_new_candidates_are_evaluated(monkeypatch):
+    asked, known = [], {}
+
+    def squares(thetas):
+        asked.append(thetas[:, 0].tolist())
+        return thetas.astype(np.float32) ** 2
+
+    def ask(*values):
+        return remembered(known, np.array(values, float)[:, None], squares)[:, 0]
+
+    assert ask(3.0, 1.0, 3.0).tolist() == [9.0, 1.0, 9.0]
+    assert ask(1.0, 2.0).tolist() == [1.0, 4.0]
+    assert ask(2.0, 3.0).tolist() == [4.0, 9.0]
+    assert asked == [[3.0, 1.0], [2.0]]
+    monkeypatch.setattr(memory, "MOST_BYTES", 8)  # two results
+    assert ask(1.0, 2.0).tolist() == [1.0, 4.0] and len(known) == 2
+    assert ask(3.0).tolist() == [9.0] and asked[2:] == [[3.0]]
