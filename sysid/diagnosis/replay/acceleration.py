@@ -4,7 +4,6 @@ To a goal that is held the profile is exact at any time. Behind a low-pass the g
 moves on: it is held at its middle for half a millisecond at a time.
 """
 
-import math
 from functools import partial
 
 import flax.struct
@@ -78,7 +77,6 @@ def way_to(
     goal: tuple[Array, Array, Array],
     limits: Limits,
     time: Float[Array, "*#c"],
-    longest: float,
 ) -> Way:
     """Follows a goal behind a low-pass for a time: ċ = w, |ẇ| ≤ a; see `profiled`.
 
@@ -87,7 +85,6 @@ def way_to(
         goal: the low-pass [rad], its target [rad] and its cutoff [Hz].
         limits: of speed and acceleration; where that is infinite, nothing is right.
         time: h [s].
-        longest: bound of h [s].
 
     Returns:
         The way; its mean is that of the cubics through the parts' ends.
@@ -95,8 +92,10 @@ def way_to(
     Source:
         Ours: exact without a low-pass, and with one to second order in `PART_S`.
     """
-    count = max(1, math.ceil(longest / PART_S - 0.01))
     last, target, cutoff = goal
+    # A goal that no low-pass moves is held for all the time.
+    moving = jnp.max(jnp.where(jnp.isfinite(cutoff), time, 0.0))
+    count = jnp.maximum(jnp.ceil(moving / PART_S - 0.01), 1.0).astype(jnp.int32)
     acceleration = jnp.where(limits.act, limits.acceleration, 1.0)
     go = partial(profiled, fastest=limits.speeds, acceleration=acceleration)
     part = time / count

@@ -134,7 +134,7 @@ def _walk(held, sent, params: Params, dt: float) -> tuple[Array, Array, Array]:
             there = filtered(last, goal, cutoff, within)
             there = _pursuit(before, since, there, speeds, within)
             if gentle:
-                way = way_to((before, rate[0]), (last, goal, cutoff), limits, h, dt)
+                way = way_to((before, rate[0]), (last, goal, cutoff), limits, h)
                 command = _chosen(acts & limits.act, way.command[1], command)
                 rate[0] = _chosen(acts & limits.act, way.speed[1], rate[0])
                 mean = _chosen(limits.act, way.mean, mean)

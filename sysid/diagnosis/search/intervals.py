@@ -101,13 +101,14 @@ def _timing(slot: Slot, u: float, data: JointTrack) -> float:
     A servo meets targets and limits in its own time, and rounds a filter to its cycle:
     the lag of its command path is uncertain by σ = `CYCLE_S`. That is a delay itself, a
     time constant 1 / 2π f, the time A / v of a way at a limited speed, the time
-    √(2 A / a) of one at a limited acceleration, and the time τ / S of a rise at a
-    limited slope.
+    √(2 A / a) of one at a limited acceleration or v / a until its speed, and the time
+    τ / S of a rise at a limited slope.
     """
     if slot.name in ("delay_s", "latency_s"):
         return CYCLE_S / slot.scale
     if slot.name == "acceleration_rad_s2":
-        return CYCLE_S * math.sqrt(4.0 * slot.scale * abs(u) / data.angle_scale)
+        whole = math.sqrt(4.0 * slot.scale * abs(u) / data.angle_scale)
+        return CYCLE_S * max(slot.scale / data.speed_scale, whole)
     ways = {
         "cutoff_hz": 2.0 * math.pi,
         "speed_rad_s": 2.0 / data.angle_scale,

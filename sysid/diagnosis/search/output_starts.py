@@ -26,8 +26,9 @@ from sysid.least_squares import fit_all
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""
 
-ALONE_TRIED = 6
-"""The same of those that come nearest to it when they are fitted alone."""
+ALONE_TRIED = 3
+"""The same of those that come nearest to it when they are fitted alone, at nominal and
+in the smaller model, each."""
 
 
 def settled_output(
@@ -65,8 +66,10 @@ def output_starts(
     the smaller model or as in the equations, whichever errs less. The other begins at
     nominal, with the effect fitted alone: without an effort all torques together may
     grow, and in that valley the near one may have gone far. Those are chosen that come
-    nearest if they are fitted alone, there or in the smaller model, and some that the
-    equations prefer.
+    nearest if they are fitted alone there, those that do in the smaller model, and some
+    that the equations prefer. Where a nominal parameter of the smaller model stands for
+    an effect, as the servo's damping for viscous friction, nothing is left there that
+    would tell one effect from another; at nominal it is.
 
     Args:
         problem: the error of the angle.
@@ -75,31 +78,27 @@ def output_starts(
     """
     sets, space = [m.effects for m in proposed], problem.space
     beside = [_beside(space, smaller, m) for m in proposed]
-    near = _better(problem, sets, beside, [m.fit.theta for m in proposed])
+    fitted = [m.fit.theta for m in proposed]
+    closer = _costs(problem, sets, beside) <= _costs(problem, sets, fitted)
+    near = np.where(closer[:, None], beside, fitted)
     alone = _fitted_alone(problem, sets, [at_nominal(problem, m) for m in proposed])
     added = _fitted_alone(problem, sets, beside)
-    costs = [cost for cost, _ in _better(problem, sets, alone, added)]
-    ranked = np.argsort(costs)[:ALONE_TRIED].tolist()
-    chosen = dict.fromkeys([*range(min(EQUATIONS_TRIED, len(sets))), *ranked])
-    return [(sets[k], start) for k in chosen for start in (near[k][1], alone[k])]
+    chosen = dict.fromkeys(range(min(EQUATIONS_TRIED, len(sets))))
+    for thetas in (alone, added):
+        ranked = np.argsort(_costs(problem, sets, thetas))
+        chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
+    return [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
 
 
-def _better(
+def _costs(
     problem: OutputProblem,
     sets: Sequence[tuple[str, ...]],
-    one: Sequence[Float[np.ndarray, " n"]],
-    other: Sequence[Float[np.ndarray, " n"]],
-) -> list[tuple[float, Float[np.ndarray, " n"]]]:
-    """Returns the cost and coordinates of the better of two, for every set."""
-    both = np.stack([one, other], 1)
-    errors = np.sum(problem.residual(both.reshape(-1, both.shape[2])) ** 2, 1)
-    penalty = [
-        [_penalty(problem.space, effects, x) for x in some]
-        for effects, some in zip(sets, both, strict=True)
-    ]
-    costs = errors.reshape(-1, 2) + np.array(penalty)
-    best = np.argmin(costs, 1)
-    return [(float(costs[k, i]), both[k, i]) for k, i in enumerate(best)]
+    thetas: Sequence[Float[np.ndarray, " n"]],
+) -> Float[np.ndarray, " s"]:
+    """Returns squared errors and penalties of the priors, for every set."""
+    errors = np.sum(problem.residual(np.stack(thetas)) ** 2, 1)
+    pairs = zip(sets, thetas, strict=True)
+    return errors + np.array([_penalty(problem.space, *pair) for pair in pairs])
 
 
 def _fitted_alone(

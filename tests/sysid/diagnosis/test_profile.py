@@ -15,7 +15,7 @@ EFFECT, NAME = "acceleration_limit", "acceleration_rad_s2"
     [("pendulum", True), pytest.param("axis", False, marks=pytest.mark.slow)],
 )
 def test_an_acceleration_is_named_with_its_size(rig, effort):
-    once = Conditions(rig, 15.0, effort, rate_hz=100.0, repeats=False)
+    once = Conditions(rig, 15.0, effort, rate_hz=100.0, repeats=False, round_s=6.0)
     case = drawn_case(21, (EFFECT,), "strong", once)
     said = diagnose(list(case.logs), believed(case.stand, effort))
     assert [cause.effect for cause in said.causes] == [EFFECT]
