@@ -68,8 +68,8 @@ def output_starts(
     grow, and in that valley the near one may have gone far. Those are chosen that come
     nearest if they are fitted alone there, those that do in the smaller model, and some
     that the equations prefer. Where a nominal parameter of the smaller model stands for
-    an effect, as the servo's damping for viscous friction, nothing is left there that
-    would tell one effect from another; at nominal it is.
+    an effect, as the servo's damping for viscous friction, all effects come alike near
+    there; at nominal they do not.
 
     Args:
         problem: the error of the angle.
