@@ -36,10 +36,11 @@ of the velocity gain."""
 _LONGEST_DELAY_S = 0.095
 _ROUNDS, _STEP = 30, 0.01
 
-_FLOOR = np.array([0.012, 0.012, 0.012, 0.003, 0.0015])
+_FLOOR = np.array([0.018, 0.012, 0.012, 0.003, 0.0015])
 """Deviations of the logarithms below which nothing is believed: nobody knows when
 within a step the firmware acts, and a quarter of a millisecond biases stiffness by
-about a percent. Neighbours' own gains and forces of rotation are the rest."""
+about a percent. Neighbours' own gains and forces of rotation are the rest: over forty
+joints of the second simulator stiffness errs by 2 percent (root mean square)."""
 
 _NO_SPEED_LIMIT, _NO_TORQUE_LIMIT = 100.0, 1e6
 
@@ -121,7 +122,11 @@ def _task(start: Float[np.ndarray, " 9"], nominal: Float[np.ndarray, " 9"]) -> T
     low, high = np.full(9, -np.inf), np.full(9, np.inf)
     high[2], low[7:] = np.log(_LONGEST_DELAY_S), 0.0
     steps = np.full(9, _STEP)
-    return Task(start, np.arange(9), nominal, _DEVIATION, low, high, steps)
+    # A speed limit and dry friction make the cost rough: with forward differences a fit
+    # may stop ten percent away from the least cost.
+    return Task(
+        start, np.arange(9), nominal, _DEVIATION, low, high, steps, central=True
+    )
 
 
 def _starts(center: Float[np.ndarray, " n"]) -> Float[np.ndarray, "c n"]:

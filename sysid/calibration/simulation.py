@@ -21,13 +21,12 @@ from sysid.calibration.record import BLOCK_S, STEP_S, Record
 SERVO = slice(0, 5)
 """Parameters of the servo; after them inertia, weight, dry and viscous friction."""
 
-# The delay comes last: it may, for the path is the same at all times, and between two
-# steps a smooth command can be read where a jump cannot (a speed limit would take a
-# part of a jump for the whole of it).
+# The delay comes after the low-pass: it may, for the path is the same at all times, and
+# between two steps a smooth command can be read where a jump cannot.
 _NAMES = (
     "lowpass_cutoff",
-    "slew_limit",
     "transport_delay",
+    "slew_limit",
     "torque_limit",
     "coulomb_friction",
     "viscous_friction",
@@ -140,8 +139,8 @@ def _simulate(thetas, inputs, drive, held_by):
     def single(theta):
         values = (
             {"cutoff_hz": jnp.exp(theta[3])},
-            {"speed_rad_s": jnp.exp(theta[4])},
             {"delay_s": jnp.exp(theta[2])},
+            {"speed_rad_s": jnp.exp(theta[4])},
             {"limit_nm": limit},
             {"torque_nm": torque * jnp.maximum(theta[7], 0.0)},
             {"damping_nms": kd * jnp.maximum(theta[8], 0.0)},
