@@ -24,7 +24,7 @@ from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.lanes import LANES, in_lanes, lanes_first
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.memory import Memory, remembered
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.programs import Program, programs
@@ -39,10 +39,6 @@ meet its limit as soon as a target arrives, has a target for each substep."""
 
 SLOW = 12.0
 """How much longer than that a low-pass with the corner ω at least lasts, 2π / ω."""
-
-FEW_LANES = 16
-"""Number of candidates that are simulated side by side where there are only a few: it
-takes about half as long as `LANES`."""
 
 WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
@@ -83,9 +79,8 @@ def simulated(
     known = {} if known is None else known
 
     def angles(program: Program, some: np.ndarray) -> np.ndarray:
-        size = FEW_LANES if len(some) <= 2 * FEW_LANES else LANES
         parts = []
-        for lanes, count in in_lanes(some, size):
+        for lanes, count in in_lanes(some):
             values = problem.space.values(lanes)
             out = _simulated(problem.data.track, *values, program, *fixed)
             parts.append(lanes_first(out, count)[:, rows])
