@@ -6,7 +6,7 @@ sent targets alone, from the start of every piece; where it is not, the logged e
 drives the joint, in windows too short for errors to add up (multiple shooting).
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import flax.struct
@@ -19,13 +19,13 @@ from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay import band, cascade
-from sysid.diagnosis.replay.command import command_path, held_command
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first, side_by_side
 from sysid.diagnosis.search.memory import Memory, remembered
+from sysid.diagnosis.search.part_targets import part_targets
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.programs import Program, programs
 
@@ -44,11 +44,24 @@ WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
 
 
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What has been simulated of one track.
+
+    Attributes:
+        angles: of candidates, by program.
+        targets: mean targets, by the parameters of their path.
+    """
+
+    angles: dict[Program, Memory] = field(default_factory=dict)
+    targets: Memory = field(default_factory=dict)
+
+
 def simulated(
     problem: Problem,
     thetas: Float[np.ndarray, "c n"],
     rows: Int[np.ndarray, " m"] | slice = slice(None),
-    known: dict[Program, Memory] | None = None,
+    known: Known | None = None,
 ) -> Float[np.ndarray, "c m p"]:
     """Encoder angles y of candidates, from measured starts, smoothed as the track is.
 
@@ -58,7 +71,7 @@ def simulated(
         problem: the joint's track and coordinates.
         thetas: coordinates of candidates [1].
         rows: steps of the grid that are asked for [steps].
-        known: what has been simulated of the same track and rows, by program; it grows.
+        known: what has been simulated of the same track and rows; it grows.
 
     Returns:
         y at those steps [rad].
@@ -73,25 +86,31 @@ def simulated(
     means = _parts(dt, _target_s(problem))
     substeps = means * _parts(dt / means, SUBSTEP_S)
     driven = problem.known == "mechanics"
-    steps = len(problem.data.track.cmd)
-    window = max(round(WINDOW_S / dt), 8) if driven else steps
-    fixed = (dt / substeps, (means, substeps), window, driven)
-    known = {} if known is None else known
+    track, known = problem.data.track, Known() if known is None else known
+    window = max(round(WINDOW_S / dt), 8) if driven else len(track.cmd)
+    fixed = (dt / substeps, substeps, window, driven)
 
-    def angles(program: Program, some: np.ndarray) -> np.ndarray:
-        parts = []
-        for lanes, count in in_lanes(some):
-            values = problem.space.values(lanes)
-            out = _simulated(problem.data.track, *values, program, *fixed)
-            parts.append(lanes_first(out, count)[:, rows])
-        return np.concatenate(parts)
+    walk = dt / substeps * (substeps // means), means, known.targets
+    targets = part_targets(track, problem.space.values(thetas)[0], *walk)
 
-    parts, order = [], []
+    def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
+        params, nuisance = problem.space.values(thetas[lanes])
+        acting = {name: params[name] for name in program}
+        out = _simulated(track, targets[lanes], acting, nuisance, program, *fixed)
+        return lanes_first(out, count)[:, rows]
+
+    def angles(program: Program, who: np.ndarray, new: np.ndarray) -> np.ndarray:
+        batches = [partial(batch, program, *lanes) for lanes in in_lanes(who[new])]
+        return np.concatenate(side_by_side(batches))
+
+    calls, order = [], []
     for program, who in programs(problem.space, thetas):
-        before = known.setdefault(program, {})
-        parts.append(remembered(before, thetas[who], partial(angles, program)))
+        before = known.angles.setdefault(program, {})
+        evaluate = partial(angles, program, who)
+        calls.append(partial(remembered, before, thetas[who], evaluate))
         order.append(who)
-    return np.concatenate(parts)[np.argsort(np.concatenate(order))]
+    found = np.concatenate(side_by_side(calls)).astype(float)
+    return found[np.argsort(np.concatenate(order))]
 
 
 def _target_s(problem: Problem) -> float:
@@ -121,29 +140,26 @@ class _Windows:
     track: Track
 
 
-@partial(jax.jit, static_argnums=(3, 4, 5, 6, 7))
+@partial(jax.jit, static_argnums=(4, 5, 6, 7, 8))
 def _simulated(
     track: Track,
+    targets: Float[Array, "c t k p"],
     params: dict[str, dict[str, Float[Array, " c"]]],
     nuisance: Nuisance,
     program: Program,
     dt: float,
-    divided: tuple[int, int],
+    substeps: int,
     window: int,
     driven: bool,
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side."""
-    params = {name: params[name] for name in program.effects}
-    acting = [name for name in program.effects if name in KINDS]
-    effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in acting}
+    effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in program}
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
     steps, pieces = track.pos.shape
-    means, substeps = divided
-    each = substeps // means
-    targets = _targets(track, params, dt * each, means, program.moves)
-    cut = _cut(track, targets, window, dt * substeps)
+    each = substeps // targets.shape[2]
+    cut = _cut(track, jnp.moveaxis(targets, 0, -1), window, dt * substeps)
     effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
     model = [(KINDS[n], p) for n, p in effects.items()]
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
@@ -204,19 +220,6 @@ def _begun(track: Track, now: Motion, nuisance: Nuisance, effects, states, anew)
     anew = anew & (effects[cascade.NAME]["k_int"] > 0.0)
     begun = cascade.begun(states[at], anew, torque)
     return (*states[:at], begun, *states[at + 1 :])
-
-
-def _targets(track: Track, params, dt: float, means: int, moves: bool):
-    """Mean commands of a step's equal parts (t, k, p, c), along the sent targets."""
-    ends = jnp.arange(1, means + 1)[None, :, None, None]
-    sent = means * (track.sent[:, None] + 1.0) - ends
-    held = jnp.repeat(track.held[:, None], means, 1)
-    held, sent = (x.reshape(-1, *x.shape[2:]) for x in (held, sent))
-    if moves:
-        mean = command_path(held, sent, params, dt).mean
-    else:
-        mean = held_command(held, sent, params, dt)
-    return mean.reshape(-1, means, *mean.shape[1:])
 
 
 def _cut(

@@ -92,20 +92,33 @@ def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:
         return BOUNCE * abs(u)
     if slot.effect == "payload_mass" and slot.nominal == 0.0:
         return slot.prior_sd
-    return _timing(slot, u, data)
+    return timing_error(slot, u, data)
 
 
-def _timing(slot: Slot, u: float, data: JointTrack) -> float:
-    """Standard error of a coordinate by a servo's cycle.
+def timing_error(slot: Slot, u: float, data: JointTrack) -> float:
+    """Standard error of a coordinate by a servo's cycle, in units of its scale [1].
 
     A servo meets targets and limits in its own time, and rounds a filter to its cycle:
     the lag of its command path is uncertain by σ = `CYCLE_S`. That is a delay itself, a
     time constant 1 / 2π f, the time A / v of a way at a limited speed, the time
     √(2 A / a) of one at a limited acceleration or v / a until its speed, and the time
     τ / S of a rise at a limited slope.
+
+    Args:
+        slot: the coordinate.
+        u: where it is [1].
+        data: with sizes that occur: A [rad], v [rad/s], τ [N·m].
+
+    Returns:
+        0 where a servo's cycle does nothing.
+
+    Source:
+        Ours.
     """
     if slot.name in ("delay_s", "latency_s"):
         return CYCLE_S / slot.scale
+    if slot.kind != "reciprocal":
+        return 0.0
     if slot.name == "acceleration_rad_s2":
         whole = math.sqrt(4.0 * slot.scale * abs(u) / data.angle_scale)
         return CYCLE_S * max(slot.scale / data.speed_scale, whole)
@@ -114,6 +127,4 @@ def _timing(slot: Slot, u: float, data: JointTrack) -> float:
         "speed_rad_s": 2.0 / data.angle_scale,
         "slope_nm_s": 1.0 / data.torque_scale,
     }
-    if slot.kind != "reciprocal" or slot.name not in ways:
-        return 0.0
-    return CYCLE_S * slot.scale * ways[slot.name]
+    return CYCLE_S * slot.scale * ways.get(slot.name, 0.0)

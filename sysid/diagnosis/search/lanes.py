@@ -1,9 +1,15 @@
-"""Candidates are evaluated in batches of two sizes, for which programs are compiled."""
+"""Candidates are evaluated in batches of two sizes, for which programs are compiled.
 
-from collections.abc import Iterator
+Batches run beside each other: the steps of one are too small for more than one core.
+"""
+
+import os
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
 
 import numpy as np
-from jaxtyping import ArrayLike, Float
+from jaxtyping import ArrayLike, Float, Shaped
 
 LANES = 64
 """Number of candidates that are evaluated at once."""
@@ -11,19 +17,21 @@ LANES = 64
 FEW_LANES = 16
 """The same where there are only a few: it takes about half as long as `LANES`."""
 
-Batch = tuple[Float[np.ndarray, "l n"], int]
-"""Coordinates of candidates, and how many of them are asked for."""
+T = TypeVar("T")
+
+Batch = tuple[Shaped[np.ndarray, "l ..."], int]
+"""Candidates, and how many of them are asked for."""
 
 
-def in_lanes(thetas: Float[np.ndarray, "c n"]) -> Iterator[Batch]:
+def in_lanes(candidates: Shaped[np.ndarray, "c ..."]) -> Iterator[Batch]:
     """Yields batches of one size, the last filled up with its first candidate.
 
     Args:
-        thetas: coordinates of candidates [1].
+        candidates: their coordinates [1], or their numbers.
     """
-    lanes = FEW_LANES if len(thetas) <= 2 * FEW_LANES else LANES
-    for first in range(0, len(thetas), lanes):
-        some = thetas[first : first + lanes]
+    lanes = FEW_LANES if len(candidates) <= 2 * FEW_LANES else LANES
+    for first in range(0, len(candidates), lanes):
+        some = candidates[first : first + lanes]
         filled = np.repeat(some[:1], lanes - len(some), 0)
         yield np.concatenate([some, filled]), len(some)
 
@@ -36,3 +44,22 @@ def lanes_first(found: ArrayLike, count: int) -> Float[np.ndarray, "c ..."]:
         count: number of candidates that are asked for.
     """
     return np.moveaxis(np.asarray(found, float), -1, 0)[:count]
+
+
+def side_by_side(calls: Sequence[Callable[[], T]]) -> list[T]:
+    """Returns what calls return, made beside each other on the cores of the process.
+
+    Args:
+        calls: of compiled programs, which leave Python to others.
+    """
+    if len(calls) == 1:
+        return [calls[0]()]
+    with ThreadPoolExecutor(_cores()) as threads:
+        return list(threads.map(lambda call: call(), calls))
+
+
+def _cores() -> int:
+    """Number of cores on which the process may run."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1

@@ -8,7 +8,7 @@ since two of them agree to the last digit but one, and a search may turn on that
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 MOST_BYTES = 2**27
 """Memory of one program beyond which the oldest results are forgotten [bytes]."""
@@ -20,17 +20,17 @@ Memory = dict[bytes, np.ndarray]
 def remembered(
     memory: Memory,
     thetas: Float[np.ndarray, "c n"],
-    evaluate: Callable[[np.ndarray], Float[np.ndarray, "k ..."]],
+    evaluate: Callable[[Int[np.ndarray, " k"]], Float[np.ndarray, "k ..."]],
 ) -> Float[np.ndarray, "c ..."]:
     """Results f(θ) of candidates, from memory where they are known.
 
     Args:
         memory: results so far, of the same function f; new ones are added.
         thetas: coordinates of candidates [1].
-        evaluate: f, of single precision.
+        evaluate: f of the candidates with these numbers, of single precision.
 
     Returns:
-        One result for each candidate, in double precision.
+        One result for each candidate, in single precision.
 
     Source:
         Ours.
@@ -39,9 +39,9 @@ def remembered(
     new = {k: i for i, k in reversed(list(enumerate(keys))) if k not in memory}
     if new:
         order = sorted(new.values())
-        found = evaluate(thetas[order]).astype(np.float32)
+        found = evaluate(np.array(order)).astype(np.float32)
         memory |= {keys[i]: row for i, row in zip(order, found, strict=True)}
-    result = np.stack([memory[k] for k in keys]).astype(float)
+    result = np.stack([memory[k] for k in keys])
     spare = len(memory) - MOST_BYTES // max(memory[keys[0]].nbytes, 1)
     for key in list(memory)[: max(spare, 0)]:
         del memory[key]

@@ -15,11 +15,9 @@ from scipy.ndimage import maximum_filter1d
 
 from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
-from sysid.diagnosis.search.closed_loop import simulated
-from sysid.diagnosis.search.memory import Memory
+from sysid.diagnosis.search.closed_loop import Known, simulated
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.programs import Program
 from sysid.diagnosis.search.whitening import (
     Noise,
     autoregressive,
@@ -38,14 +36,14 @@ class OutputProblem(Problem):
     Attributes:
         equations: the residuals from which its candidates come.
         stages: candidates that came from them, by the effects of the smaller model.
-        angles: of candidates that were simulated; see `closed_loop`.
+        seen: what was simulated; see `closed_loop`.
     """
 
     channels: ClassVar[tuple[str, str]] = ("", "position")
     amplifies: ClassVar[bool] = False
     equations: Problem | None = None
     stages: dict[tuple[str, ...], list] = field(default_factory=dict)
-    angles: dict[Program, Memory] = field(default_factory=dict)
+    seen: Known = field(default_factory=Known)
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -66,7 +64,7 @@ class OutputProblem(Problem):
         track = self.data.track
         rows = sample_rows(len(track.cmd))
         measured, most = np.asarray(track.pos, float), FAR * self.data.angle_scale
-        error = measured[rows] - simulated(self, thetas, rows, self.angles)
+        error = measured[rows] - simulated(self, thetas, rows, self.seen)
         error = np.clip(np.nan_to_num(error, nan=most), -most, most)
         error = np.where(self.valid[1], error, 0.0)
         weight = self.weight if weigh else 1.0

@@ -81,8 +81,9 @@ def output_starts(
     fitted = [m.fit.theta for m in proposed]
     closer = _costs(problem, sets, beside) <= _costs(problem, sets, fitted)
     near = np.where(closer[:, None], beside, fitted)
-    alone = _fitted_alone(problem, sets, [at_nominal(problem, m) for m in proposed])
-    added = _fitted_alone(problem, sets, beside)
+    begin = [at_nominal(problem, m) for m in proposed]
+    fits = _fitted_alone(problem, [*sets, *sets], [*begin, *beside])
+    alone, added = fits[: len(sets)], fits[len(sets) :]
     chosen = dict.fromkeys(range(min(EQUATIONS_TRIED, len(sets))))
     for thetas in (alone, added):
         ranked = np.argsort(_costs(problem, sets, thetas))

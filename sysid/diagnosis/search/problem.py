@@ -8,6 +8,7 @@ and a candidate's residual that is larger counts with its correlation in time.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import ClassVar
 
 import jax.numpy as jnp
@@ -18,7 +19,7 @@ from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.search.folds import folds_of
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first, side_by_side
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
 from sysid.diagnosis.search.repeats import Repeats, repeats_of
@@ -76,18 +77,17 @@ class Problem:
         Source:
             Ours.
         """
-        parts = []
-        for lanes, count in in_lanes(thetas):
-            out = equation_error(
-                self.data.track,
-                *self.space.values(lanes),
-                np.float32(self.data.friction_speed),
-                self.data.dt,
-                self.space.effects,
-            )
-            parts.append(lanes_first(out, count))
+        batches = [partial(self._batch, *batch) for batch in in_lanes(thetas)]
+        parts = side_by_side(batches)
         weight = self.weight if weigh else 1.0
         return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
+
+    def _batch(self, lanes: Float[np.ndarray, "l n"], count: int) -> np.ndarray:
+        """Residuals of the first candidates of a batch."""
+        track, speed = self.data.track, np.float32(self.data.friction_speed)
+        values = self.space.values(lanes)
+        out = equation_error(track, *values, speed, self.data.dt, self.space.effects)
+        return lanes_first(out, count)
 
     def whitened(self, raw: Float[np.ndarray, "c 2 m p"]) -> Float[np.ndarray, "c r"]:
         """Whitens residuals: ε_t = (r_t − Σ_k a_k r_{t−k}) / s.

@@ -7,15 +7,14 @@ next to nothing, are always there, and a candidate's program is chosen by the ot
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sysid.diagnosis.replay.effects import KINDS
 from sysid.diagnosis.search.parameters import Space
 
 COSTLY = (
-    "acceleration_limit",
     "payload_com",
     "encoder_eccentricity",
     "torque_slope_limit",
@@ -26,25 +25,13 @@ COSTLY = (
 )
 """Effects that take longer than a tenth of a simulation each."""
 
-PATH = ("acceleration_limit", "lowpass_cutoff", "slew_limit", "directional_slew")
-"""Effects with which the command depends on where it was."""
-
 MOST = 2
 """Number of sets of costly effects that have programs of their own in one call; more
 of them share that of all."""
 
 
-@dataclass(frozen=True)
-class Program:
-    """What is compiled.
-
-    Attributes:
-        effects: those that it simulates, in the order of the chain.
-        moves: whether the command depends on where it was.
-    """
-
-    effects: tuple[str, ...]
-    moves: bool
+Program = tuple[str, ...]
+"""What is compiled: the effects that it simulates, in the order of the chain."""
 
 
 def programs(
@@ -56,18 +43,16 @@ def programs(
         space: coordinates.
         thetas: coordinates of candidates [1].
     """
-    names = tuple(dict.fromkeys((*COSTLY, *PATH)))
-    acting = np.stack([_acts(space, thetas, name) for name in names], 1)
+    acting = np.stack([_acts(space, thetas, name) for name in COSTLY], 1)
     kinds = np.unique(acting, axis=0)
-    costly = [kind for kind in kinds if kind[: len(COSTLY)].any()]
-    if len(costly) > MOST:
-        acting |= acting[:, : len(COSTLY)].any(1, keepdims=True)
+    if np.count_nonzero(kinds.any(1)) > MOST:
+        acting |= acting.any(1, keepdims=True)
         kinds = np.unique(acting, axis=0)
+    chain = [e for e in space.effects if e in KINDS]
     for kind in kinds:
-        some = {name for name, there in zip(names, kind, strict=True) if there}
-        effects = tuple(e for e in space.effects if e not in COSTLY or e in some)
-        who = np.flatnonzero((acting == kind).all(1))
-        yield Program(effects, bool(some.intersection(PATH))), who
+        some = {name for name, there in zip(COSTLY, kind, strict=True) if there}
+        effects = tuple(e for e in chain if e not in COSTLY or e in some)
+        yield effects, np.flatnonzero((acting == kind).all(1))
 
 
 def _acts(space: Space, thetas: np.ndarray, effect: str) -> Bool[np.ndarray, " c"]:

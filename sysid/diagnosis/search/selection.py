@@ -13,6 +13,7 @@ from sysid.diagnosis.search.candidate import (
     log_likelihood_gain,
     off_prior,
 )
+from sysid.diagnosis.search.intervals import timing_error
 from sysid.diagnosis.search.problem import Problem
 
 LEAST_SHARE = 0.03
@@ -20,6 +21,9 @@ LEAST_SHARE = 0.03
 
 PLAUSIBLE_SD = 5.0
 """Prior standard deviations from nominal up to which a parameter is plausible."""
+
+SURE = 1.96
+"""Standard errors by a servo's cycle that a time must be away from none."""
 
 MODEL_ERROR = 0.003
 """Share of a gain that does not decide between two effects: no equation is exact."""
@@ -48,11 +52,27 @@ def accepted(problem: Problem, smaller: Model, larger: Model, base: Model) -> bo
             held = heldout_gain(smaller, larger, problem.samples)
             return held > NOMINAL_THRESHOLD
         return gain > max(NOMINAL_THRESHOLD, least)
+    if any(_within_cycle(problem, larger, e) for e in added):
+        return False
     if "load_friction" in added and not _predicts_effort(problem, smaller, larger):
         return False
     threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
     removes = _removes_enough(problem, smaller, larger, base)
     return gain > max(threshold, least) and removes
+
+
+def _within_cycle(problem: Problem, model: Model, effect: str) -> bool:
+    """Whether the times of an effect are no longer than a servo's own cycle may be.
+
+    Its gain may be large nevertheless: of many rows the mean knows such times well.
+    """
+    slots = [(i, problem.space.slots[i]) for i in problem.space.of(effect)]
+    sizes = [(model.fit.theta[i], slot) for i, slot in slots if slot.is_size]
+    unsure = [timing_error(slot, float(u), problem.data) for u, slot in sizes]
+    return any(unsure) and all(
+        abs(u - slot.nominal) < SURE * error
+        for (u, slot), error in zip(sizes, unsure, strict=True)
+    )
 
 
 def _predicts_effort(problem: Problem, smaller: Model, larger: Model) -> bool:

@@ -9,12 +9,14 @@ from sysid.diagnosis.search.memory import remembered
 def test_only_new_candidates_are_evaluated(monkeypatch):
     asked, known = [], {}
 
-    def squares(thetas):
-        asked.append(thetas[:, 0].tolist())
-        return thetas.astype(np.float32) ** 2
-
     def ask(*values):
-        return remembered(known, np.array(values, float)[:, None], squares)[:, 0]
+        thetas = np.array(values, float)[:, None]
+
+        def squares(new):
+            asked.append(thetas[new, 0].tolist())
+            return thetas[new] ** 2
+
+        return remembered(known, thetas, squares)[:, 0]
 
     assert ask(3.0, 1.0, 3.0).tolist() == [9.0, 1.0, 9.0]
     assert ask(1.0, 2.0).tolist() == [1.0, 4.0]

@@ -1,0 +1,118 @@
+"""Mean targets of the equal parts of a step, in which a simulation reads them.
+
+The path of the targets costs as much as the motion behind it and is the same for all
+candidates that differ in the motion alone, most of a fit: it is walked once. A step of
+the grid keeps as many targets as two of its whole length may need. A part is shorter,
+and most of them would take no time in it: each part gets those that may.
+"""
+
+from functools import partial
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jaxtyping import Array, Float
+
+from sysid.diagnosis.replay.command import (
+    EFFECTS,
+    Params,
+    command_path,
+    held_command,
+)
+from sysid.diagnosis.replay.motion import Track
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first, side_by_side
+from sysid.diagnosis.search.memory import Memory, remembered
+
+Values = dict[str, dict[str, Float[np.ndarray, " c"]]]
+"""Values of parameters of candidates c, by effect and name."""
+
+NEAR = 1e-3
+"""Share of a part by which a target may miss it, of rounding."""
+
+MOVING = ("lowpass_cutoff", "slew_limit", "directional_slew", "acceleration_limit")
+"""Effects with which the command depends on where it was, unless infinite."""
+
+
+def part_targets(
+    track: Track, params: Values, dt: float, parts: int, known: Memory
+) -> Float[np.ndarray, "c t k p"]:
+    """Mean commands of candidates over a step's equal parts k; see `command_path`.
+
+    Args:
+        track: with targets and when they were sent.
+        params: values of the parameters by effect.
+        dt: length of a part [s].
+        parts: number of parts of a step.
+        known: paths so far of the same track and parts; it grows.
+
+    Returns:
+        Means [rad], in single precision.
+
+    Source:
+        Ours.
+    """
+    names = [(e, name) for e in EFFECTS if e in params for name in params[e]]
+    rows = np.stack([np.asarray(params[e][name]) for e, name in names], 1)
+    fixed = (dt, parts, _targets_of_a_part(track, parts))
+
+    def batch(lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
+        some: Values = {}
+        for (effect, name), column in zip(names, lanes.T, strict=True):
+            some.setdefault(effect, {})[name] = column
+        return lanes_first(_walked(track, some, *fixed, moves), count)
+
+    def walked(new: np.ndarray) -> np.ndarray:
+        moves = _moves(names, rows[new])
+        kinds = [(k, np.flatnonzero(moves == k)) for k in (False, True)]
+        calls = [
+            partial(batch, rows[lanes], count, k)
+            for k, who in kinds
+            for lanes, count in in_lanes(new[who])
+        ]
+        order = np.concatenate([who for _, who in kinds])
+        return np.concatenate(side_by_side(calls))[np.argsort(order)]
+
+    return remembered(known, rows, walked)
+
+
+def _moves(names: list[tuple[str, str]], rows: np.ndarray) -> np.ndarray:
+    """Where a command depends on where it was."""
+    limits = [i for i, (effect, _) in enumerate(names) if effect in MOVING]
+    return np.any(np.isfinite(rows[:, limits]), axis=1)
+
+
+def _targets_of_a_part(track: Track, parts: int) -> int:
+    """The most targets that may act in one part of a step, with the one before it.
+
+    n = 1 + max #{i : −2 < t_i < 0}, with t_i in parts before the end of a part: a delay
+    moves beginnings by less than a part, whole parts aside.
+    """
+    ages = _ages(np.asarray(track.sent), parts, np)
+    inside = (ages > -2.0 - NEAR) & (ages < NEAR)
+    return min(int(inside.sum(2).max()) + 1, track.sent.shape[1])
+
+
+@partial(jax.jit, static_argnames=("dt", "parts", "count", "moves"))
+def _walked(
+    track: Track, params: Params, dt: float, parts: int, count: int, moves: bool
+) -> Float[Array, "t k p c"]:
+    """Mean commands along the last targets of every part."""
+    ages = _ages(track.sent, parts, jnp)
+    last = jnp.sum(ages <= 0.0, 2, keepdims=True) - 1
+    index = jnp.clip(last + jnp.arange(1 - count, 1)[:, None], 0)
+    held = jnp.broadcast_to(track.held[:, None], ages.shape)
+    held, sent = (
+        jnp.take_along_axis(x, index, 2).reshape(-1, count, x.shape[3])
+        for x in (held, ages)
+    )
+    if moves:
+        mean = command_path(held, sent, params, dt).mean
+    else:
+        mean = held_command(held, sent, params, dt)
+    return mean.reshape(-1, parts, *mean.shape[1:])
+
+
+def _ages(sent, parts: int, xp):
+    """When targets were sent before the ends of parts, negative [parts]."""
+    ends = xp.arange(1, parts + 1)[None, :, None, None]
+    return parts * (sent[:, None] + 1.0) - ends
