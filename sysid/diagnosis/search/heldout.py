@@ -65,7 +65,12 @@ class _Part:
         j, r = self.fit.jacobian[kept], residual[kept]
         weight = 1.0 / self.task.deviation[k] ** 2
         slope = j.T @ r + weight * (theta - self.task.center)[k]
-        return np.linalg.solve(j.T @ j + np.diag(weight), slope)
+        hessian = j.T @ j + np.diag(weight)
+        try:
+            return np.linalg.solve(hessian, slope)
+        except np.linalg.LinAlgError:
+            # A free coordinate that these folds do not show stays where it is.
+            return np.linalg.lstsq(hessian, slope)[0]
 
 
 def held_out(

@@ -28,7 +28,7 @@ SURE = 1.96
 MODEL_ERROR = 0.003
 """Share of a gain that does not decide between two effects: no equation is exact."""
 
-THRESHOLD = 18.0
+THRESHOLD = 12.0
 """Least log-likelihood gain of a cause."""
 
 NOMINAL_THRESHOLD = 7.0

@@ -1,5 +1,6 @@
 """Parameters without a fold: at the optimum of the others, also along a curve."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -71,3 +72,23 @@ def test_one_step_leaves_the_curve(monkeypatch):
     """Negative control."""
     monkeypatch.setattr(heldout, "STEPS", 1)
     assert np.abs(predicted().theta[1] - without(1)).max() > 0.3
+
+
+def test_a_free_coordinate_that_no_other_fold_shows_stays():
+    """Its prior says nothing, and only the fold that is left out depends on it."""
+    shown = np.array([[1.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+
+    def far(thetas):
+        return (np.asarray(thetas) - 3.0) @ shown.T + np.array([0.1, -0.1, 0.0])
+
+    folds = np.array([0, 0, 1])
+    problem = SimpleNamespace(
+        folds=lambda: folds,
+        fold=folds,
+        residual=far,
+        space=SimpleNamespace(local=lambda: []),
+    )
+    free = replace(TASK, deviation=np.full(2, np.inf))
+    (fit,) = fit_all(far, [free], rounds=10)
+    (held,) = held_out(problem, [free], [fit])
+    assert held.theta[1] == pytest.approx([3.0, fit.theta[1]], abs=1e-3)
