@@ -121,9 +121,15 @@ def redrawn(task: Task, again: int) -> Task:
 
 
 def _possible(conditions: Conditions, effects: Sequence[str]) -> list[str]:
-    """What can be hidden; a gain that nobody knows is no effect."""
+    """What can be hidden; a gain that nobody knows is no effect.
+
+    Nor is viscous friction where damping may have any value and no effort is logged:
+    both are a torque that grows with the speed.
+    """
     gains = () if conditions.gains == "5 %" else ("stiffness", "damping")
-    return [name for name in effects if name not in gains]
+    alike = conditions.gains == "unknown" and not conditions.effort
+    left_out = (*gains, "viscous_friction") if alike else gains
+    return [name for name in effects if name not in left_out]
 
 
 def _block(seed: int, block: int) -> list[tuple[str, Conditions]]:

@@ -3,15 +3,19 @@
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.search.candidate import likelihood_gap
+from sysid.diagnosis.search.candidate import Model, likelihood_gap
 from sysid.diagnosis.search.search import Search
-from sysid.diagnosis.search.selection import THRESHOLD
+from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD, THRESHOLD
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE
 from sysid.diagnosis.verdict.causes import evidence
 from sysid.result import Alternative
 
 DISTINCT = 3.0
 """Difference of log-likelihood below which two effects are indistinguishable."""
+
+ALIKE = 0.5
+"""Half the squared distance of two predictions, in noise, below which no record of this
+motion distinguishes them [1]."""
 
 
 def alternatives_of(found: Search) -> tuple[Alternative, ...]:
@@ -38,7 +42,8 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
         gap = likelihood_gap(model, found.best, found.samples)
-        distinct = gap > max(DISTINCT, NESTED_SHARE * gain)
+        least = NOMINAL_THRESHOLD if _alike(model, found.best) else DISTINCT
+        distinct = gap > max(least, NESTED_SHARE * gain)
         distinct = distinct or effect in NESTED.get(cause, ())
         # Chance alone gives some effects as much as a nominal value's small step.
         chance = gain - gap < THRESHOLD and not _confusable(effect, cause)
@@ -47,6 +52,16 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
             apart = apart or not found.judge.confirms(without, model)
             result.append(Alternative(effect, shown, apart, cause))
     return sorted(result, key=lambda a: a.score_gap)[:8]
+
+
+def _alike(one: Model, other: Model) -> bool:
+    """Whether two models predict the same, and priors alone set them apart.
+
+    Without an effort a servo's damping does what viscous friction does, but it has a
+    tolerance.
+    """
+    between = one.fit.residual - other.fit.residual
+    return 0.5 * float(between @ between) < ALIKE
 
 
 def _confusable(one: str, other: str) -> bool:

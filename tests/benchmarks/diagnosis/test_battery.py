@@ -120,6 +120,11 @@ def test_all_levels_of_a_factor_come_equally_often():
     assert len({t.conditions.clock for t in tasks}) == 100
     gains = {t.conditions.gains for t in tasks if "stiffness" in t.effects}
     assert gains <= {"5 %"}  # a gain that nobody knows is no effect
+    viscous = [
+        t for t in plan.wide_plan(5, range(700)) if "viscous_friction" in t.effects
+    ]
+    shown = [t.conditions.effort or t.conditions.gains != "unknown" for t in viscous]
+    assert len(shown) > 5 and all(shown)  # damping of any size would hide it
 
 
 def test_what_a_record_does_not_show_is_drawn_again():

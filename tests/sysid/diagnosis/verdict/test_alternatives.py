@@ -1,0 +1,45 @@
+"""What could stand in the place of a cause, on searches that are written down here."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.verdict.alternatives import alternatives_of
+
+SAMPLES = 1000
+NOISE = np.random.default_rng(0).normal(size=SAMPLES)
+
+
+def model(effect, behind, moved=0.0):
+    """A candidate that is so many nat behind, with a residual moved by so much."""
+    score = 1000.0 + 2.0 * behind
+    return SimpleNamespace(
+        effects=(effect,) if effect else (),
+        score=score,
+        noise_cost=0.0,
+        correlation=1.0,
+        variance=lambda samples: max(1.0, score / samples),
+        fit=SimpleNamespace(cost=score, residual=NOISE + moved / np.sqrt(SAMPLES)),
+    )
+
+
+@pytest.mark.parametrize(
+    ("behind", "moved", "apart"),
+    [
+        (2.0, 9.0, False),
+        (4.0, 9.0, True),  # the records say which
+        (4.0, 0.3, False),  # only priors do
+        (8.0, 0.3, True),  # and these do so clearly
+    ],
+)
+def test_what_predicts_the_same_is_set_apart_by_priors_alone(behind, moved, apart):
+    best, base = model("damping", 0.0), model("", 200.0, moved=50.0)
+    other = model("viscous_friction", behind, moved)
+    judge = SimpleNamespace(confirms=lambda smaller, larger: True)
+    others = ({"damping": [other]}, {"damping": base}, [])
+    found = Search(None, base, best, *others, SAMPLES, judge)
+    (alternative,) = alternatives_of(found)
+    assert alternative.effect == "viscous_friction"
+    assert alternative.distinguishable == apart
