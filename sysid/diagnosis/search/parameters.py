@@ -179,7 +179,8 @@ class Space:
         params: dict[str, dict] = {}
         nuisance = {}
         for column, slot in zip(theta.T, self.slots, strict=True):
-            x = slot.value(column).astype(np.float32)
+            with np.errstate(over="ignore"):  # no limit is infinite
+                x = slot.value(column).astype(np.float32)
             if slot.effect:
                 params.setdefault(slot.effect, {})[slot.name] = x
             else:
