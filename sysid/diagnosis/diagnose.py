@@ -7,10 +7,8 @@ Every joint is searched for itself (`sysid.diagnosis.search.search`); effects th
 several joints share are reported once, with where they act.
 """
 
-import os
 import time
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import partial
 
@@ -24,6 +22,7 @@ from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.problem import Problem, make_problem
 from sysid.diagnosis.search.search import Examined, search
 from sysid.diagnosis.search.space import make_space
+from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.verdict.verdict import verdict_of
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
@@ -58,9 +57,8 @@ def examine(
     # Joints fill the cores. BLAS threads for 25 columns wait for each other: a step of
     # a fit took 17 ms instead of 0.2 beside other work.
     with threadpool_limits(1, "blas"):
-        with ThreadPoolExecutor(os.cpu_count()) as joints:
-            each = partial(_examined, logs=logs, mechanism=mechanism)
-            examined = list(joints.map(each, tracks))
+        joints = [partial(_examined, t, logs, mechanism) for t in tracks]
+        examined = side_by_side(joints)
         found = verdict_of(examined, mechanism, seed)
     found = replace(
         found,

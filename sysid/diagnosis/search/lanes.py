@@ -1,12 +1,6 @@
-"""Candidates are evaluated in batches of two sizes, for which programs are compiled.
+"""Candidates are evaluated in batches of two sizes, for which programs are compiled."""
 
-Batches run beside each other: the steps of one are too small for more than one core.
-"""
-
-import os
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from collections.abc import Iterator
 
 import numpy as np
 from jaxtyping import ArrayLike, Float, Shaped
@@ -16,8 +10,6 @@ LANES = 64
 
 FEW_LANES = 16
 """The same where there are only a few: it takes about half as long as `LANES`."""
-
-T = TypeVar("T")
 
 Batch = tuple[Shaped[np.ndarray, "l ..."], int]
 """Candidates, and how many of them are asked for."""
@@ -44,22 +36,3 @@ def lanes_first(found: ArrayLike, count: int) -> Float[np.ndarray, "c ..."]:
         count: number of candidates that are asked for.
     """
     return np.moveaxis(np.asarray(found, float), -1, 0)[:count]
-
-
-def side_by_side(calls: Sequence[Callable[[], T]]) -> list[T]:
-    """Returns what calls return, made beside each other on the cores of the process.
-
-    Args:
-        calls: of compiled programs, which leave Python to others.
-    """
-    if len(calls) == 1:
-        return [calls[0]()]
-    with ThreadPoolExecutor(_cores()) as threads:
-        return list(threads.map(lambda call: call(), calls))
-
-
-def _cores() -> int:
-    """Number of cores on which the process may run."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1

@@ -20,8 +20,9 @@ from sysid.diagnosis.replay.command import (
     held_command,
 )
 from sysid.diagnosis.replay.motion import Track
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first, side_by_side
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.memory import Memory, remembered
+from sysid.diagnosis.side_by_side import side_by_side
 
 Values = dict[str, dict[str, Float[np.ndarray, " c"]]]
 """Values of parameters of candidates c, by effect and name."""
@@ -53,19 +54,19 @@ def part_targets(
     """
     names = [(e, name) for e in EFFECTS if e in params for name in params[e]]
     rows = np.stack([np.asarray(params[e][name]) for e, name in names], 1)
-    fixed = (dt, parts, _targets_of_a_part(track, parts))
 
-    def batch(lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
+    def batch(slots: int, lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
         some: Values = {}
         for (effect, name), column in zip(names, lanes.T, strict=True):
             some.setdefault(effect, {})[name] = column
-        return lanes_first(_walked(track, some, *fixed, moves), count)
+        return lanes_first(_walked(track, some, dt, parts, slots, moves), count)
 
     def walked(new: np.ndarray) -> np.ndarray:
         moves = _moves(names, rows[new])
         kinds = [(k, np.flatnonzero(moves == k)) for k in (False, True)]
+        slots = _targets_of_a_part(track, parts)
         calls = [
-            partial(batch, rows[lanes], count, k)
+            partial(batch, slots, rows[lanes], count, k)
             for k, who in kinds
             for lanes, count in in_lanes(new[who])
         ]
@@ -92,17 +93,17 @@ def _targets_of_a_part(track: Track, parts: int) -> int:
     return min(int(inside.sum(2).max()) + 1, track.sent.shape[1])
 
 
-@partial(jax.jit, static_argnames=("dt", "parts", "count", "moves"))
+@partial(jax.jit, static_argnames=("dt", "parts", "slots", "moves"))
 def _walked(
-    track: Track, params: Params, dt: float, parts: int, count: int, moves: bool
+    track: Track, params: Params, dt: float, parts: int, slots: int, moves: bool
 ) -> Float[Array, "t k p c"]:
     """Mean commands along the last targets of every part."""
     ages = _ages(track.sent, parts, jnp)
     last = jnp.sum(ages <= 0.0, 2, keepdims=True) - 1
-    index = jnp.clip(last + jnp.arange(1 - count, 1)[:, None], 0)
+    index = jnp.clip(last + jnp.arange(1 - slots, 1)[:, None], 0)
     held = jnp.broadcast_to(track.held[:, None], ages.shape)
     held, sent = (
-        jnp.take_along_axis(x, index, 2).reshape(-1, count, x.shape[3])
+        jnp.take_along_axis(x, index, 2).reshape(-1, slots, x.shape[3])
         for x in (held, ages)
     )
     if moves:

@@ -19,7 +19,7 @@ from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.search.folds import folds_of
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first, side_by_side
+from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
 from sysid.diagnosis.search.repeats import Repeats, repeats_of
@@ -31,6 +31,7 @@ from sysid.diagnosis.search.whitening import (
     whitened,
     with_past,
 )
+from sysid.diagnosis.side_by_side import side_by_side
 from sysid.logs.log import MeasuredLog
 
 
