@@ -4,10 +4,11 @@ from typing import Any
 
 import jax
 import jax.numpy as jnp
-from jaxtyping import Array, Float, Key, PRNGKeyArray
+from jaxtyping import Array, Bool, Float, Key, PRNGKeyArray
 
 from envs.base import State
 from envs.env import HandEnv
+from envs.streams import stream
 
 
 class BatchEnv:
@@ -15,10 +16,21 @@ class BatchEnv:
 
     Where a step ends an episode, everything but reward, done, metrics, signals and info
     is that of the next episode's start. It is an `envs.base.VectorEnv`.
+
+    With `spread_ends` the first episode of each world is cut short at a time of its
+    own. Worlds that seldom fail stay in step without it: a learner sees the beginnings
+    of all episodes, then nothing but their ends.
     """
 
-    def __init__(self, env: HandEnv, num_envs: int, auto_reset: bool = True):
-        self.env, self.num_envs, self.auto_reset = env, num_envs, auto_reset
+    def __init__(
+        self,
+        env: HandEnv,
+        num_envs: int,
+        auto_reset: bool = True,
+        spread_ends: bool = False,
+    ):
+        self.env, self.num_envs = env, num_envs
+        self.auto_reset, self.spread_ends = auto_reset, spread_ends
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self.env, name)
@@ -65,6 +77,8 @@ class BatchEnv:
         """
         state = self._forget_ended(state)
         after = jax.vmap(self.env.step)(state, action)
+        if self.spread_ends:
+            after = self._cut_short(after)
         if not self.auto_reset:
             return after
         # Episodes end rarely; most steps need no restart at all.
@@ -78,6 +92,21 @@ class BatchEnv:
         running = 1.0 - state.done
         sums = {name: state.info[name] * running for name in names}
         return state.replace(info=state.info | sums)
+
+    def _cut_short(self, after: State) -> State:
+        """Ends first episodes by their time limit, at a step that each world draws."""
+        cut = jax.vmap(self._is_cut)(after) & (after.done == 0)
+        truncation = jnp.where(cut, 1.0, after.info["truncation"])
+        return after.replace(
+            done=jnp.where(cut, 1.0, after.done),
+            info=after.info | {"truncation": truncation},
+        )
+
+    def _is_cut(self, after: State) -> Bool[Array, ""]:
+        world, steps = after.memory.world, after.memory.steps
+        key = stream(world.key, "first_end")
+        last = jax.random.randint(key, (), 1, self.env.episode_length + 1)
+        return (world.episodes == 0) & (steps >= last)
 
     def _restart_done(self, after: State) -> State:
         fresh = jax.vmap(self.env.restart)(after)

@@ -150,14 +150,13 @@ def _preview(args: argparse.Namespace) -> str:
 def run(args: argparse.Namespace) -> int:
     """Trains, and reports on stdout."""
     from fingers_mjx.policy.interface import identity
-    from fingers_mjx.runs.setup import make_env
+    from fingers_mjx.runs.setup import training_env
     from fingers_mjx.training.progress import reporter
     from fingers_mjx.training.train import train_population
 
     path, members = _members(args)
     setup = members[0].setup
-    worlds = len(members) * setup.train.num_envs
-    env = make_env(setup, worlds, setup.train.backend)
+    env = training_env(setup, len(members))
     with reporter(sys.stdout) as show:
         show({"event": "note", "text": _headline(setup.train, path, len(members))})
         results = train_population(

@@ -18,7 +18,7 @@ from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.ppo.state import init_train_state, make_learner
-from fingers_mjx.runs.setup import Setup, make_env, new_setup
+from fingers_mjx.runs.setup import Setup, make_env, new_setup, training_env
 from fingers_mjx.training.counting import counting, timed
 from fingers_mjx.training.progress import reporter
 from fingers_mjx.training.train import train
@@ -68,7 +68,7 @@ def learn(out: Path, size: LearnSize) -> Learned:
         size: how much of everything.
     """
     setup = new_setup(size.train, None)
-    env = make_env(setup, size.train.num_envs, size.train.backend)
+    env = training_env(setup)
     run_dir = out / time.strftime("run-%Y%m%d-%H%M%S")
     start_s = time.monotonic()
     with timed("4/5 learning on this machine, from nothing"):

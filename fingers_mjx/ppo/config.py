@@ -103,6 +103,9 @@ class TrainConfig:
         log_every: iterations between two rows of metrics.
         checkpoint_every: iterations between two checkpoints.
         keep_checkpoints: newest checkpoints kept on disk.
+        spread_ends: cut the first episode of each world short at a time of its own, so
+            that worlds in which the hand seldom falls do not all begin again at once.
+            A policy that is trained further from `--warm-start` needs it.
         video_every: iterations between two videos of the policy; 0 for none.
         loggers: where the learning curve goes beside JSON and TensorBoard: "wandb",
             "rerun", or both with a comma between; each is an extra of its own.
@@ -123,6 +126,7 @@ class TrainConfig:
     log_every: int = _number(10, 1, MAX_ITERATIONS, free=True)
     checkpoint_every: int = _number(200, 1, MAX_ITERATIONS, free=True)
     keep_checkpoints: int = _number(3, 1, MAX_ITERATIONS, free=True)
+    spread_ends: bool = False
     video_every: int = _number(0, 0, MAX_ITERATIONS, free=True)
     loggers: tuple[Literal["wandb", "rerun"], ...] = _free(())
     on_overflow: Literal["stop", "warn"] = _free("stop")

@@ -80,6 +80,23 @@ def make_env(
     )
 
 
+def training_env(setup: Setup, members: int = 1) -> BatchEnv:
+    """Makes the worlds in which one or more members of these settings are trained.
+
+    Raises:
+        InputError: settings, a hand or a backend with which there is no environment.
+    """
+    train = setup.train
+    return make_batch(
+        train.task,
+        members * train.num_envs,
+        setup.env,
+        train.backend,
+        hand=setup.hand,
+        spread_ends=train.spread_ends,
+    )
+
+
 def config_digest(directory: Path) -> str:
     """Returns the SHA-256 of `config.yaml` followed by `hand.yaml`.
 

@@ -28,7 +28,7 @@ from fingers_mjx.evaluation.source import (
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.runs.setup import Setup, make_env
+from fingers_mjx.runs.setup import Setup, training_env
 from fingers_mjx.studies.comparison.comparison import Row, corrected
 from fingers_mjx.studies.statistics.compare import difference
 from fingers_mjx.studies.statistics.pairs import pair
@@ -82,7 +82,7 @@ def train_on(
     start = start_of(Training(path, setup, keep_schedules=False), warm)
     if start is None:
         return
-    env = make_env(setup, setup.train.num_envs, setup.train.backend)
+    env = training_env(setup)
     train(env, setup, path, start=start, identity=identity(env), on_progress=say)
 
 

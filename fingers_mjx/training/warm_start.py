@@ -20,6 +20,10 @@ from fingers_mjx.ppo.state import TrainState
 
 COUNT = 200_000
 """Observations that a bundle's normalizer counts as: new terms must soon count."""
+KNOWN_COUNT = 100_000_000
+"""The same if no term is new. The first observations of many worlds are those of an
+episode's beginning; as many as these would change what the policy sees, and it falls.
+"""
 NEW_STD = 0.1
 """Standard deviation of inputs that the bundle did not have, until they are seen."""
 
@@ -59,7 +63,8 @@ def started_from(train: TrainState, env: Any, path: Path) -> TrainState:
     layers = _layers(bundle, rows, gain)
     policy = _with_layers(train.params.policy, layers, bundle.source)
     mean, std = (_entries(x, rows, new) for x, new in _statistics(bundle, ours, gain))
-    normalizer = _with_statistics(train.normalizer, mean, std)
+    count = COUNT if (rows < 0).any() else KNOWN_COUNT
+    normalizer = _with_statistics(train.normalizer, mean, std, count)
     return dataclasses.replace(_with_policy(train, policy), normalizer=normalizer)
 
 
@@ -141,7 +146,9 @@ def _with_layers(policy: Any, layers: list[Any], source: object) -> Any:
     return {**policy, "params": params}
 
 
-def _with_statistics(normalizer: Any, mean: np.ndarray, std: np.ndarray) -> Any:
+def _with_statistics(
+    normalizer: Any, mean: np.ndarray, std: np.ndarray, count: int
+) -> Any:
     """Returns the normalizer with known statistics of the actor's entries.
 
     The critic's observation begins with the actor's.
@@ -153,10 +160,10 @@ def _with_statistics(normalizer: Any, mean: np.ndarray, std: np.ndarray) -> Any:
             tree,
         )
 
-    count = normalizer.count
+    number = type(normalizer.count)
     return normalizer.replace(
         mean=filled(normalizer.mean, mean, 0.0),
         std=filled(normalizer.std, std, 1.0),
-        summed_variance=filled(normalizer.summed_variance, COUNT * std**2, COUNT),
-        count=type(count)(hi=0, lo=COUNT),
+        summed_variance=filled(normalizer.summed_variance, count * std**2, count),
+        count=number(hi=0, lo=count),
     )

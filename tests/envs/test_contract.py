@@ -8,6 +8,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from envs.batch import BatchEnv
 from envs.registry import task_names
 from rewards import TABLES
 
@@ -118,6 +119,22 @@ def test_the_time_limit_truncates(task):
     state = task.step(at_last_step(task, task.first), task.actions(1)[0] * 0)
     np.testing.assert_array_equal(state.done, 1)
     np.testing.assert_array_equal(state.info["truncation"], 1)
+
+
+def test_first_episodes_are_cut_short_at_times_of_their_own(task):
+    """By the time limit, once, and nothing else of the episode is changed."""
+    batch = BatchEnv(task.batch.env, task.batch.num_envs, spread_ends=True)
+    still = task.actions(1)[0] * 0
+    step = jax.jit(batch.step)
+    state, ends = task.first, []
+    for _ in range(2 * batch.episode_length):
+        state = step(state, still)
+        ends.append(np.asarray(state.info["truncation"]))
+    ends = np.array(ends)
+    assert (ends[: batch.episode_length].sum(0) == 1).all()
+    assert len(set(ends.argmax(0).tolist())) > 2
+    for world in ends.T:
+        assert (np.diff(np.flatnonzero(world)) == batch.episode_length).all()
 
 
 def test_sums_of_an_episode_begin_anew(task, rollout):

@@ -13,7 +13,7 @@ from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource, load_source
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import CONFIG_FILE
-from fingers_mjx.runs.setup import make_env, overridden
+from fingers_mjx.runs.setup import overridden, training_env
 from fingers_mjx.studies.sweep.engines.population import most_worlds, shared
 from fingers_mjx.studies.sweep.outcome import is_evaluated
 from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
@@ -69,7 +69,7 @@ def _train(
     if not group:
         return {}
     setup = next(iter(group.values())).setup
-    env = make_env(setup, len(group) * setup.train.num_envs, setup.train.backend)
+    env = training_env(setup, len(group))
     results = train_population(
         env, list(group.values()), identity=identity(env), on_progress=on_progress
     )

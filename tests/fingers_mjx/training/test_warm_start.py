@@ -12,9 +12,10 @@ from envs.errors import InputError
 from envs.registry import make_batch
 from envs.tasks.crawl import CrawlConfig
 from fingers_deploy import load_bundle
+from fingers_mjx.ppo.brax import update_normalizer
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.state import init_train_state, make_learner, train_template
-from fingers_mjx.training.warm_start import COUNT, started_from
+from fingers_mjx.training.warm_start import COUNT, KNOWN_COUNT, started_from
 
 CRAWL = Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 NETWORK = load_bundle(CRAWL).network
@@ -61,6 +62,27 @@ def test_the_same_task_goes_on_with_the_same_actor():
     np.testing.assert_array_equal(
         jax.tree.leaves(train.params.value)[0], jax.tree.leaves(fresh.params.value)[0]
     )
+
+
+@pytest.mark.parametrize(("count", "changed"), [(KNOWN_COUNT, False), (COUNT, True)])
+def test_what_many_worlds_see_first_does_not_change_a_known_policy(count, changed):
+    """All worlds begin alike; counted like the policy's own past they made it fall."""
+    env = make_batch("crawl", 1)
+    _, train, _ = started(env)
+    before = train.normalizer
+    assert int(before.count) == KNOWN_COUNT
+    number = type(before.count)(hi=0, lo=count)
+    ratio = count / KNOWN_COUNT
+    variance = jax.tree.map(lambda x: x * ratio, before.summed_variance)
+    after = before.replace(count=number, summed_variance=variance)
+    sizes = env.observation_size.items()
+    first = {k: np.zeros((1, 16_384, n), np.float32) for k, n in sizes}
+    valid = np.ones((1, 16_384), bool)
+    for _ in range(24):
+        after = update_normalizer(after, first, valid)
+    moved = np.abs(after.mean["state"] - before.mean["state"]) / before.std["state"]
+    assert (moved.max() > 0.5) == changed
+    assert (moved.max() < 0.05) == (not changed)
 
 
 def test_another_scale_asks_for_the_same_small_motion():
