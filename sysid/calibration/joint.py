@@ -33,6 +33,16 @@ _DEVIATION = np.array([2.0, 2.0, 1.5, 1.5, 2.0, 0.05, 0.05, 1.0, 1.0])
 """Of the priors: of logarithms, and of the frictions in units of the largest torque and
 of the velocity gain."""
 
+_BESIDE = (
+    (-0.2, 0.0),
+    (0.2, 0.0),
+    (0.0, -0.08),
+    (0.0, 0.08),
+    (-0.2, -0.08),
+    (0.2, 0.08),
+)
+"""Shifts of the logarithms of stiffness and delay from which a fit begins again."""
+
 _LONGEST_DELAY_S = 0.095
 _ROUNDS, _STEP = 30, 0.01
 
@@ -111,10 +121,21 @@ def _solved(
     for _ in range(2):
         # Once more with channels weighed by what they really scatter.
         motion.weigh(motion.residuals(fit.theta[None])[0])
-        task = replace(tasks[0], start=fit.theta)
-        fit = fit_all(motion.residuals, [task], _ROUNDS)[0]
+        again = [replace(tasks[0], start=start) for start in _nearby(fit.theta)]
+        fit = min(fit_all(motion.residuals, again, _ROUNDS), key=lambda fit: fit.cost)
     errors, wide = standard_errors(fit, _DEVIATION, motion.blocks())
     return fit.theta, wide * np.hypot(errors[SERVO], _FLOOR)
+
+
+def _nearby(theta: Float[np.ndarray, " 9"]) -> Float[np.ndarray, "c 9"]:
+    """Where a fit ended, and starts beside it.
+
+    Stiffness and delay make up for each other, and the cost has several minima along
+    that way.
+    """
+    shifts = np.zeros((len(_BESIDE) + 1, len(theta)))
+    shifts[1:, [0, 2]] = _BESIDE
+    return theta + shifts
 
 
 def _task(start: Float[np.ndarray, " 9"], nominal: Float[np.ndarray, " 9"]) -> Task:

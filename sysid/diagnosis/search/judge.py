@@ -12,7 +12,9 @@ errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over blocks o
     t = d̄ √B / s_d
 
 must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
-parameter that leaves its tolerance. It need not where repeats show that the logged
+parameter that leaves its tolerance. Gains of a servo that nobody knows are, with and
+without the effect, those that the logged effort shows with it: free ones would do in
+the simulation what the effect does. It need not where repeats show that the logged
 effort has no other explanation: what parameters a little out of their tolerances hide
 of the angle, as a servo's damping hides friction, they do not hide of the effort.
 """
@@ -58,6 +60,9 @@ LITTLE = 0.01
 """Share of a squared error below which next to nothing of it is left; friction that
 cancels four fifths of a torque leaves 0.04."""
 
+GAIN_TOLERANCE = 0.05
+"""Tolerance of gains that the effort shows [1]."""
+
 TRIED = 5
 """Number of candidates of a stage that are judged, best first."""
 
@@ -76,6 +81,7 @@ class Judge:
         self.errors: dict[int, tuple[Model, np.ndarray]] = {}
         self.bounded: dict[int, tuple[Model, Model]] = {}
         self.fits: dict[int, tuple[Model, Model]] = {}
+        self.served: dict[int, tuple[Model, Judge]] = {}
 
     @property
     def sees(self) -> bool:
@@ -96,6 +102,35 @@ class Judge:
         output, fit = settled_output(output, self.base)
         self.fits[id(self.base)] = (self.base, fit)
         return output
+
+    def serving(self, model: Model) -> "Judge":
+        """Returns the judge to whom unknown gains are those of a model of the effort.
+
+        Args:
+            model: fitted to the equations; itself, where its gains are known or the
+                angle alone was fitted.
+        """
+        output, gains = self.output, self._unknown_gains(model)
+        if output is self.problem or not gains:
+            return self
+        if id(model) not in self.served:
+            slots = list(self.problem.space.slots)
+            for i in gains:
+                shown, sd = float(model.fit.theta[i]), SIGMA * GAIN_TOLERANCE
+                slots[i] = replace(slots[i], nominal=shown, prior_sd=sd)
+            space = Space(tuple(slots))
+            judge = Judge(replace(self.problem, space=space), self.base)
+            judge.output = replace(output, space=space)
+            self.served[id(model)] = (model, judge)
+        return self.served[id(model)][1]
+
+    def _unknown_gains(self, model: Model) -> list[int]:
+        """Returns the coordinates of gains that are free, if the effort shows them."""
+        if not self.problem.data.effort.all():
+            return []
+        space = self.problem.space
+        found = [i for e in ("stiffness", "damping") for i in space.of(e)]
+        return [i for i in found if np.isinf(space.slots[i].prior_sd)]
 
     def moved(self, model: Model) -> Model:
         """Returns a model of the equations fitted to the angle."""
@@ -161,10 +196,11 @@ class Judge:
         """Whether the larger model predicts angles better than the smaller one."""
         if not self.sees:
             return True
-        better = self.moved(larger)
-        gain = log_likelihood_gain(self.moved(smaller), better, self.output.samples)
+        judge = self.serving(larger)
+        better = judge.moved(larger)
+        gain = log_likelihood_gain(judge.moved(smaller), better, self.output.samples)
         needed = gain > NOMINAL_THRESHOLD or self._explains(smaller, larger)
-        return needed and self.t_value(self.nominal(smaller), better) > LEVEL
+        return needed and judge.t_value(judge.nominal(smaller), better) > LEVEL
 
     def _explains(self, smaller: Model, larger: Model) -> bool:
         """Whether only the larger model leaves little more than noise in the effort.

@@ -96,7 +96,7 @@ def _remaining(left: _Left) -> list[str]:
 
 def _no_nearer(found: Search) -> list[str]:
     """Finds causes that together do not lower the error of the simulated angle."""
-    judge, causes = found.judge, found.best.effects
+    judge, causes = found.judge.serving(found.best), found.best.effects
     if not causes or not judge.sees:
         return []
     if judge.t_value(judge.nominal(found.base), judge.moved(found.best)) > 0.0:

@@ -17,7 +17,9 @@ class Said(Judge):
 
     def __init__(self, gain, t, repeat=True, effort=True):
         data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
-        super().__init__(SimpleNamespace(data=data, known="both", repeat=repeat), None)
+        space = SimpleNamespace(of=lambda effect: [])
+        problem = SimpleNamespace(data=data, known="both", repeat=repeat, space=space)
+        super().__init__(problem, None)
         self.gain, self.t = gain, t
         self.output = SimpleNamespace(samples=4)
 

@@ -1,0 +1,92 @@
+"""Gains that nobody knows, and an effort that shows them.
+
+In the simulation of the angle alone a servo's free damping does what friction does. The
+records are integrated here, by none of the project's simulators.
+"""
+
+import numpy as np
+import pytest
+
+from envs.physics.quiet_mujoco import mujoco
+from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.candidate import fit_models
+from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
+from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.space import SIGMA
+from sysid.drive import JointDrive, Nominal
+from sysid.logs.log import make_log
+from sysid.mechanism import model_mechanism
+
+RATE_HZ, DT = 250.0, 0.0005
+KP, KD, WEIGHT, INERTIA = 3.0, 0.05, 0.075, 0.01325
+ARM = """
+<mujoco><worldbody><body><joint name="servo" axis="0 1 0" armature="0.002"/>
+<inertial pos="0 0 -0.15" mass="0.5" diaginertia="1e-5 1e-5 1e-5"/>
+</body></worldbody></mujoco>"""
+PERIOD_S, PERIODS = 6.0, 3
+
+
+def recorded(viscous_nms, free=True, seed=0):
+    """A log of a servo at a pendulum with this friction, and what is known of it."""
+    rng = np.random.default_rng(seed)
+    rows = round(PERIOD_S * RATE_HZ)
+    t_s = np.arange(rows) / RATE_HZ
+    phases = rng.uniform(0.0, 2.0 * np.pi, 8)
+    waves = [np.sin(2 * np.pi * (k + 1) * t_s / PERIOD_S + f) for k, f in
+             enumerate(phases)]  # fmt: skip
+    once = 0.25 * np.sum(waves, 0)
+    cmd = np.tile(once, PERIODS)
+    q, v, torque, angle, effort = cmd[0], 0.0, 0.0, [], []
+    for target in cmd:
+        angle.append(q)
+        effort.append(torque)
+        for _ in range(round(1.0 / RATE_HZ / DT)):
+            torque = KP * (target - q) - KD * v
+            rest = torque - WEIGHT * 9.81 * np.sin(q)
+            v = (v + DT * rest / INERTIA) / (1.0 + DT * viscous_nms / INERTIA)
+            q += DT * v
+    shape = (2, len(cmd))
+    noise = np.array([[3e-4], [2e-2]]) * rng.normal(size=shape)
+    columns = {
+        "cmd.servo": cmd,
+        "pos.servo": np.array(angle) + noise[0],
+        "tau.servo": np.array(effort) + noise[1],
+    }
+    log = make_log(("servo",), np.arange(len(cmd)) / RATE_HZ, columns)
+    gains = [Nominal(0.5 * KP, free=free), Nominal(3.0 * KD, free=free)]
+    model = mujoco.MjModel.from_xml_string(ARM)
+    return [log], model_mechanism(model, {"servo": JointDrive(*gains)})
+
+
+def test_friction_beside_a_free_damping_is_found():
+    said = diagnose(*recorded(0.1))
+    causes = [c.effect for c in said.causes]
+    assert (said.verdict, causes) == ("found", ["viscous_friction"])
+    (found,) = said.causes[0].parameters.values()
+    assert found.value == pytest.approx(0.1, rel=0.1)
+
+
+def test_other_gains_alone_are_no_cause():
+    assert diagnose(*recorded(0.0)).causes == ()
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_the_judge_takes_free_gains_from_the_effort(free):
+    """Known ones keep their tolerances."""
+    logs, mechanism = recorded(0.1, free)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    start = base.fit.theta
+    (model,) = fit_models(problem, [("viscous_friction",)], [start], rounds=20)
+    judge = Judge(problem, base)
+    served = judge.serving(model)
+    assert (served is not judge) == free
+    for effect, ratio in (("stiffness", 2.0), ("damping", 1.0 / 3.0)):
+        (index,) = problem.space.of(effect)
+        slot = served.output.space.slots[index]
+        if free:
+            assert np.exp(slot.nominal) == pytest.approx(ratio, rel=0.1)
+            assert slot.prior_sd == pytest.approx(SIGMA * GAIN_TOLERANCE)
+        else:
+            assert slot == problem.space.slots[index]
