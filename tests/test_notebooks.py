@@ -1,14 +1,17 @@
 """The notebooks: their text runs, and what is committed of them is made of it."""
 
 import base64
+import io
 import re
 import runpy
 
 import jax
 import nbformat
+import numpy as np
 import pytest
 from nbformat import NotebookNode
 from nbformat.v4 import new_code_cell, new_notebook, new_output
+from PIL import Image
 
 from envs import registry
 from notebooks.execute import SOURCES, cells_of, cleaned, main
@@ -100,3 +103,29 @@ def test_outputs_lose_what_belongs_to_one_machine():
     assert made.metadata == {}
     assert [o.get("text") for o in made.outputs] == ["100 %\nin z\n", None]
     assert set(made.outputs[1].data) == {"image/png"}
+
+
+def test_a_smaller_picture_keeps_the_colours_of_small_things():
+    """Five fingers in a picture that is mostly shades of grey."""
+    rng = np.random.default_rng(0)
+    shade = rng.integers(90, 240, (300, 400, 1)) + rng.integers(-9, 10, (300, 400, 3))
+    pixels = shade.astype(np.uint8)
+    hues = [
+        (214, 39, 40),
+        (44, 160, 44),
+        (31, 119, 180),
+        (255, 127, 14),
+        (148, 103, 189),
+    ]
+    for k, hue in enumerate(hues):
+        pixels[10:16, 20 * k : 20 * k + 6] = hue
+    memory = io.BytesIO()
+    Image.fromarray(pixels).save(memory, "PNG")
+    png = base64.b64encode(memory.getvalue()).decode()
+    picture = new_output("display_data", {"image/png": png})
+    cell = new_code_cell("", outputs=[picture])
+    (small,) = outputs(cleaned(new_notebook(cells=[cell]), []))
+    data = base64.b64decode(small.data["image/png"])
+    kept = np.asarray(Image.open(io.BytesIO(data)).convert("RGB")).astype(int)
+    for k, hue in enumerate(hues):
+        assert np.abs(kept[13, 20 * k + 3] - hue).max() <= 24
