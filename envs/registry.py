@@ -144,13 +144,13 @@ def make_batch(
     backend: str = "cpu",
     auto_reset: bool = True,
     hand: HandFile | None = None,
-    spread_ends: bool = False,
 ) -> BatchEnv:
-    """Makes `num_envs` worlds of a task; see `make_env` and `envs.batch.BatchEnv`."""
+    """Makes `num_envs` worlds of a task; see `make_env`."""
     from envs.batch import BatchEnv
 
-    env = make_env(name, config, backend, num_envs, hand)
-    return BatchEnv(env, num_envs, auto_reset, spread_ends)
+    return BatchEnv(
+        make_env(name, config, backend, num_envs, hand), num_envs, auto_reset
+    )
 
 
 register(

@@ -13,9 +13,14 @@ import os
 import subprocess
 import sys
 
+# Nothing is published yet: Colab needs the address of a repository that holds it, such
+# as "git+https://HOST/OWNER/fingers_mjx".
+ADDRESS = os.environ.get("FINGERS_PACKAGE", "")
 if importlib.util.find_spec("rewards") is None:  # as in Colab
-    wanted = os.environ.get("FINGERS_PACKAGE", "fingers-mjx[viz]")
-    subprocess.run([sys.executable, "-m", "pip", "install", "-q", wanted], check=True)
+    assert ADDRESS, "write the address of a repository behind ADDRESS in this cell"
+    wanted = [f"fingers-deploy @ {ADDRESS}#subdirectory=deploy"]
+    wanted += [f"fingers-mjx[viz] @ {ADDRESS}"]
+    subprocess.run([sys.executable, "-m", "pip", "install", "-q", *wanted], check=True)
 
 # %%
 # %matplotlib inline

@@ -1,6 +1,7 @@
 """What the documents say can be typed, clicked and run."""
 
 import doctest
+import itertools
 import re
 import runpy
 import shlex
@@ -90,6 +91,38 @@ def test_wrong_commands_would_be_seen():
     ]
     with pytest.raises((UsageError, InputError)):
         make_parser().parse_args(["train", "--no-such", "x"])
+
+
+EXAMPLES = sorted(ROOT.glob("examples/*/README.md"))
+
+
+def files(text):
+    """Yields the files that commands of a text read and none before them wrote."""
+    made = set()
+    for words in commands(text):
+        for before, word in itertools.pairwise(words):
+            if before in ("--out", "-o", "--json"):
+                made.add(Path(word))
+            elif "://" in word:  # git clone
+                made.add(Path(word.rsplit("/", 1)[1]))
+            elif not re.fullmatch(r"[^-=][^=]*(/|\.[a-z])[^=]*", word):
+                continue
+            elif made.isdisjoint([Path(word), *Path(word).parents]):
+                yield word
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=name)
+def test_files_in_the_commands_of_an_example_are_there(path):
+    found = list(files(path.read_text("utf-8")))
+    assert found and [file for file in found if not (ROOT / file).exists()] == []
+
+
+def test_a_file_that_nothing_made_would_be_seen():
+    """Negative control."""
+    text = (
+        "```sh\nfingers x a.yaml --a.b 0.5 --set c.d=1 -o runs\nfingers y runs/z a\n```"
+    )
+    assert list(files(text)) == ["a.yaml"]
 
 
 @pytest.mark.parametrize("path", DOCUMENTS, ids=name)

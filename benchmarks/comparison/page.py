@@ -16,6 +16,8 @@ PAGE = ROOT / "docs/results/comparison.md"
 DEVICES = ("cpu", "gpu")
 RATES = "speed-"
 """How the names of the jobs begin whose rates are set side by side."""
+STARTS = "seconds from the start of the process"
+"""How the quantities begin of which each start gives one figure."""
 NO_ROWS = "Nothing was measured yet."
 
 
@@ -98,9 +100,11 @@ def _line(*cells: str) -> str:
 def _figure(row: Row) -> str:
     if row.value is None:
         return "none"
-    said = f"{_short(row.value)} {row.unit}"
+    said = f"{_short(row.value)} {row.unit}".removesuffix(" 1")
     if row.low is None or row.high is None:
         return said
+    if row.low == row.high:  # one figure alone, which has no interval
+        return f"{said} (one start)" if row.quantity.startswith(STARTS) else said
     return f"{said} ({_short(row.low)} to {_short(row.high)})"
 
 

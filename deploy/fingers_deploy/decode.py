@@ -184,8 +184,8 @@ def describe(kind: Any, meta: Mapping[str, Any]) -> str:
 
 
 def _describe_range(meta: Mapping[str, Any]) -> str:
-    bounds = [f">= {meta['low']:g}"] if "low" in meta else []
-    bounds += [f"<= {meta['high']:g}"] if "high" in meta else []
+    bounds = [f">= {meta['low']:.10g}"] if "low" in meta else []
+    bounds += [f"<= {meta['high']:.10g}"] if "high" in meta else []
     bounds += [f"[{meta['unit']}]"] if meta.get("unit", "1") != "1" else []
     return " ".join(["", *bounds])
 

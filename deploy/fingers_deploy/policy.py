@@ -62,5 +62,5 @@ def _make(bundle: Bundle, runtime: Runtime) -> Policy:
     except ImportError as error:
         if runtime == "auto":
             return bundle.network
-        valid = "runtime numpy, or pip install fingers-deploy[onnx]"
+        valid = "runtime numpy, or pip install onnxruntime (the extra [onnx])"
         raise BundleError("runtime", "", "no ONNX Runtime", valid) from error

@@ -88,7 +88,11 @@ def override(obj: T, assignments: Iterable[str], source: str = "--set") -> T:
         field, equals, text = assignment.partition("=")
         if not (field and equals):
             raise InputError(source, "", assignment, "field.subfield=value")
-        _assign(data, field, parse_yaml(text, f"{source} {field}"), source)
+        try:
+            value = parse_yaml(text, source)
+        except InputError as error:
+            raise InputError(source, field, error.found, error.valid) from error
+        _assign(data, field, value, source)
     return from_dict(type(obj), data, source)
 
 

@@ -221,7 +221,8 @@ def _array(x: Any) -> Any:
 def _check_warp() -> None:
     if not quiet_mjx.WARP_INSTALLED:
         found = quiet_mjx.IMPORT_MESSAGES
-        raise InputError("backend", "warp", found, 'pip install "fingers-mjx[cuda12]"')
+        valid = "the extra cuda12 or cuda13 of fingers-mjx (make cuda12)"
+        raise InputError("backend", "warp", found, valid)
 
 
 def _overflow_type() -> Any:

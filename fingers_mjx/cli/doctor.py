@@ -28,11 +28,13 @@ PACKAGES = ("jax", "jaxlib", "mujoco", "mujoco-mjx", "brax", "flax", "numpy", "o
 EXTRAS = {
     "viz": ("matplotlib", "imageio_ffmpeg", "PIL", "jinja2", "pyarrow"),
     "data": ("pyarrow", "rosbags"),
-    "viewer": ("viser",),
+    "viewer": ("viser", "mjviser", "trimesh"),
+    "wandb": ("wandb",),
+    "rerun": ("rerun",),
     "ray": ("ray",),
     "hand": ("wujihandpy",),
 }
-"""What each optional part needs."""
+"""What each optional part needs, beside those that a GPU needs (`cuda12`, `cuda13`)."""
 
 PROBE_S = 180.0
 """Time after which JAX counts as hanging [s]."""
@@ -57,6 +59,12 @@ devices = [f"{d.platform} {d.device_kind}" for d in jax.devices()]
 answer = {"devices": devices, "backend": default_backend(), "broken": broken}
 print("\\n" + json.dumps(answer))
 """
+DRAWING = """
+import json
+from fingers_mjx.pictures.renderer import drawn_by
+print("\\n" + json.dumps({"renderer": drawn_by()}))
+"""
+"""Asks what draws; of its own, since a driver of OpenGL may end its process."""
 
 
 class Finding(NamedTuple):
@@ -103,6 +111,7 @@ def examined(environment: Mapping[str, str]) -> Iterator[Finding]:
         yield Finding(NOTE, "devices: not asked, since our packages cannot be imported")
         return
     yield from device_findings(probed(), environment)
+    yield renderer_finding(probed(DRAWING, what="renderer"))
 
 
 def place_findings() -> Iterator[Finding]:
@@ -162,18 +171,21 @@ def extra_findings() -> Iterator[Finding]:
     for extra, modules in EXTRAS.items():
         lacking = [m for m in modules if importlib.util.find_spec(m) is None]
         if lacking:
-            how = f'pip install "{installation.DISTRIBUTION}[{extra}]"'
-            yield Finding(NOTE, f"extra {extra}: no {', '.join(lacking)} ({how})")
+            what = f"extra {extra}: no {', '.join(lacking)}"
+            yield Finding(NOTE, f"{what} ({gpu.install_command(extra)})")
         else:
             yield Finding(OK, f"extra {extra}")
 
 
-def probed(program: str = _PROBE, limit_s: float = PROBE_S) -> dict[str, Any] | str:
-    """Asks another process for devices, backend and broken packages.
+def probed(
+    program: str = _PROBE, limit_s: float = PROBE_S, what: str = "JAX"
+) -> dict[str, Any] | str:
+    """Asks another process, by default for devices, backend and broken packages.
 
     Args:
         program: prints the answer as JSON on its last line.
         limit_s: time after which it counts as hanging [s].
+        what: is asked, for the sentence.
 
     Returns:
         The answer, or one sentence that says why there is none.
@@ -184,10 +196,10 @@ def probed(program: str = _PROBE, limit_s: float = PROBE_S) -> dict[str, Any] | 
             command, capture_output=True, text=True, timeout=limit_s, check=False
         )
     except subprocess.TimeoutExpired:
-        return f"JAX: no answer within {limit_s:g} s"
+        return f"{what}: no answer within {limit_s:g} s"
     if done.returncode:
         said = done.stderr.strip().splitlines() or [f"status {done.returncode}"]
-        return f"JAX: {said[-1]}"
+        return f"{what}: {said[-1]}"
     return json.loads(done.stdout.splitlines()[-1])
 
 
@@ -217,6 +229,17 @@ def device_findings(
         yield Finding(WRONG, f"{what} ({gpu.install_command()})")
     for sentence in answer["broken"]:
         yield Finding(WRONG, sentence)
+
+
+def renderer_finding(answer: dict[str, Any] | str) -> Finding:
+    """What draws pictures and videos.
+
+    Args:
+        answer: of `probed`.
+    """
+    if isinstance(answer, str):
+        return Finding(WRONG, answer)
+    return Finding(OK, f"renderer of videos: {answer['renderer']}")
 
 
 def _version(name: str) -> str:

@@ -23,6 +23,7 @@ def add(commands) -> None:
         "hold is refused; everything else is read back to the bit.",
         computes=False,
     )
+    convert.set_defaults(needs_jax=False)
     records.logs(convert, "log")
     options.path(convert, "out", metavar="OUT", help="file or folder to write")
     convert.add_argument(

@@ -11,14 +11,16 @@ import os
 import sys
 from collections.abc import Sequence
 
-from fingers_deploy.errors import shortened
+from fingers_deploy.errors import InputError, shortened
 from fingers_mjx.cli import doctor
-from fingers_mjx.cli.arguments.parser import CommandParser
-from fingers_mjx.cli.machine.gpu import idle_gpu, quiet_jax
+from fingers_mjx.cli.arguments.parser import CommandParser, as_typed
+from fingers_mjx.cli.machine.gpu import idle_gpu, install_command, quiet_jax
 from fingers_mjx.cli.machine.installation import (
+    DISTRIBUTION,
     UnsupportedInstallation,
     check_installation,
     check_places,
+    version,
 )
 from fingers_mjx.cli.machine.jax_ready import prepare_jax
 from fingers_robot.cli.parser import UsageError, refuse_empty
@@ -42,18 +44,19 @@ SYSID = ("info", "describe", "excite", "calibrate", "diagnose", "transfer")
 BAD_INPUT, KEYBOARD = 2, 130
 """Here, since `envs` may be a foreign package until `check_places` has looked."""
 _EXTRAS = {
-    "matplotlib": "viz",
-    "imageio_ffmpeg": "viz",
-    "PIL": "viz",
-    "jinja2": "viz",
-    "rosbags": "data",
-    "pyarrow": "viz",
-    "viser": "viewer",
-    "mjviser": "viewer",
-    "trimesh": "viewer",
-    "wandb": "wandb",
-    "rerun": "rerun",
+    module: extra
+    for extra, modules in reversed(doctor.EXTRAS.items())
+    for module in modules
 }
+"""The extra that brings a module; of several, the first that `doctor` lists."""
+
+
+class _Version(argparse.Action):
+    """Prints our version, which is looked up only when it is asked for."""
+
+    def __call__(self, parser, namespace, values, option_string=None):
+        print(f"{DISTRIBUTION} {version()}")
+        parser.exit()
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -61,10 +64,13 @@ def make_parser() -> argparse.ArgumentParser:
     parser = CommandParser(
         prog="fingers",
         description="Teach an anthropomorphic hand to walk on its fingertips.",
-        epilog="Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, 5 members "
-        "of a sweep missing, 6 an installation that cannot work, 75 stopped by a "
-        "signal after saving (go on with --resume).",
+        epilog="`fingers tasks` lists the tasks, `fingers train TASK --help` the "
+        "settings of one. Exit status: 0 done, 2 bad input, 3 diverged, 4 disk full, "
+        "5 members of a sweep missing, 6 an installation that cannot work, 75 stopped "
+        "by a signal after saving (go on with --resume).",
     )
+    what = "show the version and exit"
+    parser.add_argument("--version", action=_Version, nargs=0, help=what)
     _add(parser, "arguments.completion")
     commands = parser.add_subparsers(title="commands", metavar="COMMAND", required=True)
     for name in COMMANDS:
@@ -91,6 +97,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """
     os.environ.setdefault("TF_CPP_MIN_LOG_LEVEL", "3")
     words = sys.argv[1:] if argv is None else list(argv)
+    args = argparse.Namespace(flags=())
     try:
         if words == ["doctor"]:  # it says what is wrong where nothing else can run
             return doctor.run()
@@ -103,7 +110,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.dry_run:
             print(args.preview(args), end="")
             return 0
-        prepare_jax()
+        if args.needs_jax:
+            prepare_jax()
         return args.run(args)
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)
@@ -111,6 +119,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         status = _status(error)
         if status is None:
             raise
+        if isinstance(error, InputError):
+            error = as_typed(error, args.flags)
         return _say(_sentence(error), status)
 
 
@@ -139,7 +149,7 @@ def _sentence(error: Exception) -> str:
     """Returns what went wrong on one line."""
     if isinstance(error, ModuleNotFoundError):
         extra = _EXTRAS[str(error.name)]
-        return f'{error.name} is not installed; pip install "fingers-mjx[{extra}]"'
+        return f"{error.name} is not installed; {install_command(extra)}"
     if isinstance(error, OSError) and error.filename:
         valid = "a path that can be read and written"
         return f"{shortened(error.filename)}: found {error.strerror}; valid: {valid}"

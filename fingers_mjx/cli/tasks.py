@@ -8,7 +8,7 @@ from fingers_mjx.cli.arguments import options
 
 def add(commands) -> None:
     """Adds the command."""
-    options.command(
+    parser = options.command(
         commands,
         "tasks",
         run,
@@ -17,16 +17,17 @@ def add(commands) -> None:
         "the presets of `fingers train` and the reward tables of env.rewards.",
         computes=False,
     )
+    parser.set_defaults(needs_jax=False)
 
 
 def run(args: argparse.Namespace) -> int:
     """Prints the lists."""
+    from envs.config.settings.rows import TABLE_NAMES
     from fingers_mjx.ppo.config import PRESETS
-    from rewards import TABLES
 
     del args
     presets = {name: _first_line(make) for name, make in PRESETS.items()}
-    tables = {name: ", ".join(one) for name, one in TABLES.items()}
+    tables = {name: ", ".join(one) for name, one in TABLE_NAMES.items()}
     _print("tasks (fingers train TASK --help shows the settings)", _tasks())
     _print("presets (--preset)", presets)
     _print("reward tables (--env.rewards), of tasks with more than one", tables)

@@ -9,12 +9,13 @@ from jaxtyping import UInt8
 
 from envs.errors import InputError, one_of
 from fingers_mjx.pictures.camera import Camera
-from fingers_mjx.pictures.opengl import OpenGlRenderer
+from fingers_mjx.pictures.opengl import OpenGlRenderer, renderer_name
 from fingers_mjx.pictures.raycast import render
 from fingers_mjx.pictures.shade import Look
 
 RENDERERS = ("auto", "mujoco", "raycast")
 """`auto` takes MuJoCo's where a GPU draws: in software it is not faster."""
+_BALL = "<mujoco><worldbody><geom size='0.1'/></worldbody></mujoco>"
 
 Draw = Callable[[mujoco.MjData, Camera], UInt8[np.ndarray, "h w 3"]]
 
@@ -43,6 +44,18 @@ def renderer(
         return
     try:
         yield opengl.draw
+    finally:
+        opengl.close()
+
+
+def drawn_by() -> str:
+    """Says in words what `auto` draws with on this machine."""
+    scene = mujoco.MjModel.from_xml_string(_BALL)
+    opengl = _opengl("auto", scene, (64, 64), Look())
+    if opengl is None:
+        return "ray casting on the CPU"
+    try:
+        return f"OpenGL on {renderer_name()}"
     finally:
         opengl.close()
 

@@ -8,10 +8,10 @@ import hashlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from envs import registry
 from envs.batch import BatchEnv
 from envs.config.strict_yaml import MAX_YAML_BYTES
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
-from envs.registry import make_batch
 from fingers_deploy.files import read_regular
 from fingers_mjx.ppo.config import TrainConfig
 from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
@@ -70,7 +70,7 @@ def make_env(
     Raises:
         InputError: settings, a hand or a backend with which there is no environment.
     """
-    return make_batch(
+    return registry.make_batch(
         setup.train.task,
         num_envs,
         setup.env,
@@ -87,14 +87,11 @@ def training_env(setup: Setup, members: int = 1) -> BatchEnv:
         InputError: settings, a hand or a backend with which there is no environment.
     """
     train = setup.train
-    return make_batch(
-        train.task,
-        members * train.num_envs,
-        setup.env,
-        train.backend,
-        hand=setup.hand,
-        spread_ends=train.spread_ends,
+    worlds = members * train.num_envs
+    env = registry.make_env(
+        train.task, setup.env, train.backend, worlds, hand=setup.hand
     )
+    return BatchEnv(env, worlds, spread_ends=train.spread_ends)
 
 
 def config_digest(directory: Path) -> str:

@@ -83,6 +83,7 @@ def test_its_driver_and_its_logs_are_known(example, tmp_path):
     file.write_text("0 0.1 0\n0.01 0.1 0.05\n", "utf-8")
     log = read_log(file)
     assert log.column("pos.knee").tolist() == [0.0, 0.05]
+    assert read_log(EXAMPLE / "knee.rec").column("cmd.knee").max() == 0.3
 
 
 def test_without_it_all_three_are_unknown(tmp_path):

@@ -5,7 +5,7 @@ import re
 from collections.abc import Iterator
 from typing import Any, NoReturn
 
-from fingers_deploy.errors import shortened
+from fingers_deploy.errors import InputError, one_of, shortened
 
 _LONGEST = 200  # of a sentence, without how to get help
 _DIGITS = 40
@@ -30,6 +30,14 @@ class Parser(argparse.ArgumentParser):
     def error(self, message: str) -> NoReturn:
         """Raises the mistake."""
         raise UsageError(f"{shortened(message, _LONGEST)} (see {self.prog} --help)")
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        """Raises if a command or an option has choices and this is none of them."""
+        if action.choices is None or value in action.choices:
+            return
+        name = "/".join(action.option_strings) or str(action.metavar or action.dest)
+        valid = one_of(map(str, action.choices), str(value))
+        self.error(str(InputError(name, "", value, valid)))
 
 
 def plain_whole(text: str) -> int | None:

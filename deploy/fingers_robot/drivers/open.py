@@ -56,7 +56,7 @@ def _library() -> Any:
     try:
         import wujihandpy  # pyright: ignore[reportMissingImports]
     except ImportError as error:
-        valid = "pip install fingers-deploy[hand]"
+        valid = "pip install wujihandpy, or the extra [hand]"
         raise InputError("driver", "wuji", "no wujihandpy", valid) from error
     return wujihandpy
 

@@ -142,7 +142,7 @@ def _refusal(line: str) -> InputError:
     said = re.fullmatch(r"(.+?): found (.+); valid: (.+)", line)
     if said is not None:
         return InputError(said[1], "", said[2], said[3])
-    valid = "a model that it can run, and the extra fingers-deploy[sim]"
+    valid = "a model that it can run, and mujoco (the extra [sim])"
     return InputError("simulator", "", line, valid)
 
 

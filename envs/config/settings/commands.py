@@ -10,7 +10,9 @@ class CommandConfig:
     """Ranges of the commands in V; the ranges are the paper's.
 
     Attributes:
-        vel_x_mps, vel_y_mps, yaw_rate_rps: uniform ranges.
+        vel_x_mps: range of the velocity forward, drawn uniformly.
+        vel_y_mps: range of the velocity to the left, drawn uniformly.
+        yaw_rate_rps: range of the yaw rate, positive to the left, drawn uniformly.
         resample_s: time between commands; ours, the paper only says that it happens.
         standing_fraction: share of commands that are zero; ours.
         turning_fraction: share without planar velocity; ours.

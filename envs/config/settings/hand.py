@@ -24,9 +24,12 @@ class HandSettings:
         schedule_scale: a further factor for the schedule of single rows, by name.
         weights: reward weights that replace the start value of the table's.
         randomize: domain randomization.
-        contacts_per_world, constraints_per_world: room for contacts and constraint
-            rows on the warp backend, see `make_physics`; what does not fit
-            is dropped, and reported (`envs.physics.room`).
+        contacts_per_world: room on the warp backend for contacts, and for pairs of
+            geoms that are near each other: the mean over all worlds, which share it.
+            What does not fit is dropped, and reported (`envs.physics.room`).
+        constraints_per_world: room on the warp backend for constraint rows of limits,
+            friction losses and contacts: the most that one world has. What does not
+            fit is dropped, and reported.
     """
 
     episode_s: float = field(
@@ -53,7 +56,8 @@ class UprightSettings(HandSettings):
     """Settings of a task in which the hand stands; the common ones: `HandSettings`.
 
     Attributes:
-        max_roll_deg, max_pitch_deg: tilt of V that ends the episode (paper).
+        max_roll_deg: tilt of V to a side that ends the episode (paper).
+        max_pitch_deg: tilt of V forward or back that ends the episode (paper).
         reset_joint_rad: largest joint offset at reset (ours).
     """
 

@@ -21,8 +21,11 @@ class RandomizeConfig:
         palm_com_m: largest offset of the palm's centre of mass, each axis (ours).
         imu_tilt_rad: largest mounting error of the IMU about each axis (ours).
         gyro_bias_rps: largest constant error of the gyro, each axis (ours).
-        joint_noise_rad, gravity_noise, gyro_noise_rps: largest uniform noise of each
-            sample (ours).
+        joint_noise_rad: largest uniform noise of each joint angle that is read (ours).
+        gravity_noise: largest uniform noise of each component of the direction of
+            gravity that is read (ours).
+        gyro_noise_rps: largest uniform noise of each component of the angular
+            velocity that is read (ours).
     """
 
     tip_friction: tuple[float, float] = field(

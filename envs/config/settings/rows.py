@@ -11,6 +11,11 @@ if TYPE_CHECKING:
     from envs.config.settings.hand import HandSettings
     from rewards import RewardTable
 
+TABLE_NAMES: Mapping[str, tuple[str, ...]] = {
+    "crawl": ("footprint", "stock", "steering"),
+}
+"""Names of `rewards.TABLES`, for lists that are not to wait for JAX."""
+
 
 def table_of(task: str, name: str) -> RewardTable:
     """Returns the reward table of a task that has this name.

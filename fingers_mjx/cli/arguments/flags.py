@@ -29,7 +29,7 @@ class Words:
     """What stands after a flag; the default where the flag was not given."""
 
     given: tuple[str, ...] | None
-    default: str = ""
+    default: tuple[str, ...] = ()
 
 
 def assignments(
@@ -186,7 +186,7 @@ def _kind(setting: Setting) -> Any:
         metavar=_metavar(setting),
         instance_from_str=lambda words: Words(tuple(words)),
         is_instance=lambda value: isinstance(value, Words),
-        str_from_instance=lambda words: [words.default],
+        str_from_instance=lambda words: list(words.default),
     )
     return Annotated[Words, spec, tyro.conf.arg(help=_help(setting))]
 
@@ -218,8 +218,16 @@ def _word(kind: Any) -> str:
     return words.get(kind, "YAML")
 
 
-def _shown(value: Any) -> str:
-    """Returns a default as it would be typed."""
-    if isinstance(value, tuple | list):
-        return " ".join(_shown(entry) for entry in value)
-    return json.dumps(value)
+def _shown(value: Any) -> tuple[str, ...]:
+    """Returns a default as the words that would be typed; `none` for an empty one."""
+    if isinstance(value, Mapping):
+        words = [f"{name}={_typed(entry)}" for name, entry in value.items()]
+    elif isinstance(value, tuple | list):
+        words = [_typed(entry) for entry in value]
+    else:
+        words = [_typed(value)] if value not in (None, "") else []
+    return tuple(words) or ("none",)
+
+
+def _typed(value: Any) -> str:
+    return value if isinstance(value, str) else json.dumps(value)

@@ -38,6 +38,8 @@ def command(
 ) -> CommandParser:
     """Adds a command and returns its parser; `run` is called with its arguments.
 
+    JAX is prepared before `run`, unless the command sets `needs_jax` to False.
+
     Args:
         commands: of the parser above.
         name: as it is typed.
@@ -50,7 +52,12 @@ def command(
         name, help=summary, description=details, allow_abbrev=False
     )
     parser.set_defaults(
-        run=run, computes=computes, check=lambda args: None, dry_run=False
+        run=run,
+        computes=computes,
+        needs_jax=True,
+        check=lambda args: None,
+        dry_run=False,
+        flags=(),
     )
     return parser
 
@@ -95,8 +102,8 @@ def number(low: float = -MOST, high: float = MOST) -> Callable[[str], float]:
         value = plain_number(text)
         if value is None or not low <= value <= high:
             raise argparse.ArgumentTypeError(
-                f"found {shortened(text)}; valid: a finite number of at least {low:g} "
-                f"and at most {high:g}"
+                f"found {shortened(text)}; valid: a finite number of at least "
+                f"{low:.10g} and at most {high:.10g}"
             )
         return value
 

@@ -6,12 +6,15 @@ import argparse
 from collections.abc import Callable, Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
+from fingers_deploy.errors import InputError
 from fingers_robot.cli.parser import Parser, UsageError
 
 if TYPE_CHECKING:
     from envs.config.documented import Setting
 
 HELP = ("-h", "--help")
+ASSIGNED = ("--set", "arguments")
+"""Sources that errors of settings name, whether those came from flags or not."""
 
 
 class CommandParser(Parser):
@@ -43,6 +46,7 @@ class CommandParser(Parser):
             others = [name for name in own if name.startswith("--")]
             given = assignments(self.offered(found), flags, others)
             found.settings = [*found.settings, *given]
+            found.flags = [w.partition("=")[0] for w in flags if w.startswith("--")]
         return found, rest
 
     def _explain(
@@ -63,3 +67,20 @@ class CommandParser(Parser):
             print(flush=True)
             show(settings, " ".join((self.prog, *words)))
         self.exit()
+
+
+def as_typed(error: InputError, flags: Iterable[str]) -> InputError:
+    """Returns an error of a setting under the flag that gave it, if one did.
+
+    Args:
+        error: of a setting, such as `num_envs` of `--set`.
+        flags: as they were typed, such as `--num-envs`.
+    """
+    if str(error.source) not in ASSIGNED:
+        return error
+    for flag in flags:
+        name = flag.removeprefix("--").replace("-", "_")
+        if error.field == name or error.field.startswith(f"{name}."):
+            rest = error.field[len(name) + 1 :]
+            return InputError(flag, rest, error.found, error.valid)
+    return error

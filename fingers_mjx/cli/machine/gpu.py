@@ -3,6 +3,7 @@
 import importlib.util
 import logging
 import os
+import shutil
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
@@ -14,6 +15,9 @@ SIGNS = ("dev/nvidia[0-9]*", "usr/lib/wsl/lib/libcuda.so.1")
 
 EXTRA = "cuda12"
 """The extra of which more drivers and GPUs are capable; `cuda13` needs newer ones."""
+
+MADE = ("cuda12", "cuda13")
+"""Extras with a target of the Makefile, which keeps one from the other."""
 
 _CHOICES = ("JAX_PLATFORMS", "JAX_PLATFORM_NAME")
 _DEVICES = "CUDA_VISIBLE_DEVICES"
@@ -66,9 +70,17 @@ def has_cuda_jax() -> bool:
 
 
 def install_command(extra: str = EXTRA) -> str:
-    """Returns what installs an extra of ours, in a checkout or from anywhere."""
-    checkout = source_tree() is not None
-    return f"make {extra}" if checkout else f'pip install "{DISTRIBUTION}[{extra}]"'
+    """Returns what adds an extra of ours to the environment that runs.
+
+    An installed package is never looked for elsewhere: pip takes the one that is there
+    and adds what the extra needs.
+    """
+    if source_tree() is None:
+        return f'pip install "{DISTRIBUTION}[{extra}]"'
+    if extra in MADE:
+        return f"make {extra}"
+    uv = "uv" if shutil.which("uv") else ".uv/bin/uv"  # as the Makefile looks for it
+    return f"{uv} sync --inexact --extra {extra}"
 
 
 def quiet_jax() -> None:

@@ -67,16 +67,33 @@ def source_tree(root: Path = ROOT) -> dict[str, Any] | None:
     return table if table.get("project", {}).get("name") == DISTRIBUTION else None
 
 
+def version(root: Path = ROOT) -> str:
+    """Returns our version: that of the checkout, or of the installed package.
+
+    Args:
+        root: directory from which `fingers_mjx` was imported.
+
+    Raises:
+        UnsupportedInstallation: nothing says it.
+    """
+    table = source_tree(root)
+    return _metadata()["Version"] if table is None else table["project"]["version"]
+
+
 def _installed() -> tuple[str, list[str]]:
     """Python versions and requirements in the metadata of the installed package."""
+    own = _metadata()
+    return own["Requires-Python"] or "", metadata.requires(DISTRIBUTION) or []
+
+
+def _metadata() -> metadata.PackageMetadata:
     try:
-        own = metadata.metadata(DISTRIBUTION)
+        return metadata.metadata(DISTRIBUTION)
     except metadata.PackageNotFoundError as error:
         raise UnsupportedInstallation(
             f"{DISTRIBUTION}: found nothing that says what it needs; valid: an "
             "installed package, or a whole checkout with its pyproject.toml"
         ) from error
-    return own["Requires-Python"] or "", metadata.requires(DISTRIBUTION) or []
 
 
 def _asked_by(table: dict[str, Any], root: Path) -> tuple[str, list[str]]:

@@ -16,6 +16,7 @@ def add(actions) -> None:
         "Shows joints, columns, ranges, rates, gaps and clock steps.",
         computes=False,
     )
+    parser.set_defaults(needs_jax=False)
     records.logs(parser, "log")
 
 

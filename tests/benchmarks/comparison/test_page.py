@@ -2,7 +2,14 @@
 
 import pytest
 
-from benchmarks.comparison.page import NO_ROWS, PAGE, committed, part, with_tables
+from benchmarks.comparison.page import (
+    NO_ROWS,
+    PAGE,
+    STARTS,
+    committed,
+    part,
+    with_tables,
+)
 from benchmarks.comparison.rows import Row
 
 ROWS = committed()
@@ -52,6 +59,23 @@ def test_rates_stand_side_by_side_over_the_worlds():
 
 def test_rates_of_one_number_of_worlds_are_not_repeated():
     assert part([rate("ours", 512, 1.0)]).startswith("| peer | quantity |")
+
+
+@pytest.mark.parametrize(
+    ("unit", "ends", "quantity", "said"),
+    [
+        ("1", (None, None), "largest difference", "0.25"),
+        ("s", (0.25, 0.25), f"{STARTS} to its end", "0.25 s (one start)"),
+        ("steps/s", (0.25, 0.25), RATE, "0.25 steps/s"),
+        ("s", (0.2, 0.3), f"{STARTS} to its end", "0.25 s (0.2 to 0.3)"),
+        ("s", (None, None), "time of the fit", "0.25 s"),
+    ],
+)
+def test_a_figure_has_no_unit_of_one_and_no_interval_of_one_start(
+    unit, ends, quantity, said
+):
+    row = Row("first", "ours", "1.0", quantity, unit, 0.25, *ends)
+    assert f"| {quantity} (first) | {said} | 1.0 |" in part([row])
 
 
 def test_a_device_without_rows_says_so():

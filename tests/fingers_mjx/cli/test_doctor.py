@@ -1,8 +1,10 @@
 """`fingers doctor` and `fingers tasks`: what is there, and what is wrong with it."""
 
+import re
 from importlib import metadata
 
 import pytest
+from packaging.requirements import Requirement
 
 from fingers_mjx.cli import doctor
 from fingers_mjx.cli.machine import gpu, installation
@@ -10,6 +12,7 @@ from fingers_mjx.cli.main import main
 from fingers_mjx.ppo.config import PRESETS
 
 HEALTHY = {"devices": ["cpu cpu"], "backend": "cpu", "broken": []}
+DRAWS = {"renderer": "ray casting on the CPU"}
 CUDA = {"devices": ["gpu NVIDIA H200"], "backend": "warp", "broken": []}
 
 
@@ -19,10 +22,11 @@ def wrong(findings):
 
 def test_this_installation_is_healthy(monkeypatch, capsys):
     monkeypatch.setattr(gpu, "sees_gpu", lambda: False)
-    monkeypatch.setattr(doctor, "probed", lambda: HEALTHY)
+    monkeypatch.setattr(doctor, "probed", lambda *_, **__: HEALTHY | DRAWS)
     assert main(["doctor"]) == 0
     said = capsys.readouterr().out
     assert f"jax {metadata.version('jax')}" in said and "backend of training" in said
+    assert "renderer of videos: ray casting on the CPU\n" in said
     assert all(line[:5] in ("ok   ", "note ") for line in said.splitlines())
 
 
@@ -42,6 +46,51 @@ def test_jax_is_asked_in_a_process_of_its_own():
 def test_a_jax_that_hangs_or_fails_is_wrong(program, limit_s, said):
     (sentence,) = wrong(doctor.device_findings(doctor.probed(program, limit_s), {}))
     assert said in sentence
+
+
+def test_the_renderer_is_asked_in_a_process_of_its_own():
+    finding = doctor.renderer_finding(doctor.probed(doctor.DRAWING, what="renderer"))
+    assert finding.state == doctor.OK
+    assert re.search(r"renderer of videos: (OpenGL on .|ray casting)", finding.text)
+
+
+def test_a_renderer_that_fails_is_wrong():
+    answer = doctor.probed("raise RuntimeError('no EGL')", what="renderer")
+    assert doctor.renderer_finding(answer) == (
+        doctor.WRONG,
+        "renderer: RuntimeError: no EGL",
+    )
+
+
+def test_all_extras_are_looked_at_but_those_of_a_gpu():
+    table = installation.source_tree()
+    assert table is not None
+    declared = table["project"]["optional-dependencies"]
+    assert set(doctor.EXTRAS) == set(declared) - {"cuda12", "cuda13"}
+
+
+@pytest.mark.parametrize("extra", ["viz", "data", "viewer"])
+def test_every_package_of_an_extra_is_looked_for(extra):
+    """By its modules; the other extras have one package each."""
+    table = installation.source_tree()
+    assert table is not None
+    texts = table["project"]["optional-dependencies"][extra]
+    wanted = {Requirement(text).name.lower() for text in texts}
+    bring = metadata.packages_distributions()
+    found = {d.lower() for m in doctor.EXTRAS[extra] for d in bring[m]}
+    assert wanted <= found
+
+
+def test_an_extra_that_lacks_a_module_is_named_with_all_that_it_lacks(monkeypatch):
+    monkeypatch.setattr(
+        doctor.importlib.util,
+        "find_spec",
+        lambda name: None if name in ("mjviser", "rerun") else name,
+    )
+    said = [finding.text for finding in doctor.extra_findings()]
+    assert "extra viz" in said and "extra wandb" in said
+    assert any(text.startswith("extra viewer: no mjviser (") for text in said)
+    assert any(text.startswith("extra rerun: no rerun (") for text in said)
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,9 @@ import subprocess
 import sys
 
 import pytest
+from support.sysid_logs import small_log
+
+from sysid.logs.read import write_log
 
 HEAVY = ("jax", "brax", "mujoco", "flax", "onnxruntime", "onnx", "scipy", "numpy")
 PROGRAM = f"""
@@ -51,6 +54,23 @@ def test_a_typo_is_reported_before_anything_heavy_is_imported(argv, nearest):
 @pytest.mark.parametrize("argv", [["--help"], ["train", "--help"], ["play", "--help"]])
 def test_help_imports_nothing_heavy(argv):
     assert run(*argv) == (0, "", [])
+
+
+@pytest.mark.parametrize(
+    ("argv", "most"),
+    [
+        (["--version"], set()),
+        (["tasks"], set()),
+        (["sysid", "info", "knee.csv"], {"numpy"}),
+        (["log", "convert", "knee.csv", "knee.parquet"], {"numpy"}),
+        (["log", "convert", "knee.csv", "knee.mcap"], {"numpy"}),
+    ],
+)
+def test_a_command_that_reads_files_leaves_jax_alone(argv, most, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_log(small_log(), tmp_path / "knee.csv")
+    status, said, loaded = run(*argv)
+    assert (status, said) == (0, "") and set(loaded) <= most
 
 
 def test_a_command_that_computes_imports_jax(tmp_path):

@@ -245,7 +245,7 @@ def test_a_missing_extra_is_named(monkeypatch, capsys):
 
     monkeypatch.setattr("fingers_mjx.cli.train.run", fail)
     assert main(["train", "crawl"]) == 2
-    assert "fingers-mjx[viz]" in capsys.readouterr().err
+    assert "sync --inexact --extra viz\n" in capsys.readouterr().err
 
 
 def test_a_run_that_was_never_trained_can_be_exported(tmp_path):

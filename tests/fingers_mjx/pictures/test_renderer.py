@@ -80,6 +80,30 @@ def test_without_opengl_rays_are_cast(scene, monkeypatch):
         pass
 
 
+def test_what_draws_is_named(monkeypatch):
+    def none_here(*_):
+        raise InputError("--renderer", "mujoco", "no OpenGL", "raycast")
+
+    class OnGpu:
+        hardware = True
+
+        def __init__(self, *_):
+            pass
+
+        def close(self):
+            closed.append(self)
+
+    closed = []
+    monkeypatch.setattr(module, "OpenGlRenderer", none_here)
+    assert module.drawn_by() == "ray casting on the CPU"
+    monkeypatch.setattr(module, "OpenGlRenderer", OnGpu)
+    monkeypatch.setattr(module, "renderer_name", lambda: "NVIDIA H200/PCIe")
+    assert module.drawn_by() == "OpenGL on NVIDIA H200/PCIe"
+    monkeypatch.setattr(OnGpu, "hardware", False)
+    assert module.drawn_by() == "ray casting on the CPU"
+    assert len(closed) == 2
+
+
 def test_an_unknown_renderer_is_refused(scene):
     with (
         pytest.raises(InputError, match="auto, mujoco, raycast"),

@@ -82,7 +82,7 @@ def test_what_many_worlds_see_first_does_not_change_a_known_policy(count, change
         after = update_normalizer(after, first, valid)
     moved = np.abs(after.mean["state"] - before.mean["state"]) / before.std["state"]
     assert (moved.max() > 0.5) == changed
-    assert (moved.max() < 0.05) == (not changed)
+    assert (moved.max() < 0.1) == (not changed)
 
 
 def test_another_scale_asks_for_the_same_small_motion():

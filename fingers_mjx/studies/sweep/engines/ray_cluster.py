@@ -103,7 +103,7 @@ def _connected(address: str | None) -> Any:
     try:
         ray = importlib.import_module("ray")
     except ModuleNotFoundError as error:
-        valid = 'local or population, or pip install "fingers-mjx[ray]"'
+        valid = "local or population, or the extra ray (fingers doctor says how)"
         raise InputError("sweep", "engine", "ray, not installed", valid) from error
     try:
         ray.init(

@@ -9,7 +9,7 @@ from envs.config.documented import settings_of
 from envs.errors import InputError
 from envs.registry import get_task, task_names
 from fingers_mjx.cli.arguments.completion import SCRIPTS, candidates
-from fingers_mjx.cli.arguments.flags import assignments, divided
+from fingers_mjx.cli.arguments.flags import _shown, assignments, divided
 from fingers_mjx.cli.main import main, make_parser
 from fingers_mjx.ppo.config import TrainConfig, preset
 from fingers_mjx.runs.settings import load_settings
@@ -24,11 +24,25 @@ def offered(task="crawl"):
     yield from settings_of(get_task(task).config(), "env.")
 
 
+@pytest.fixture
+def help_of_crawl(capsys):
+    """The help of the settings, on one line without its boxes."""
+    with pytest.raises(SystemExit):
+        main(["train", "crawl", "--help"])
+    return " ".join(capsys.readouterr().out.replace("│", " ").split())
+
+
 @pytest.mark.parametrize(
     "config", [TrainConfig(), Sweep("crawl")], ids=["run", "sweep"]
 )
 def test_every_setting_says_what_it_is(config):
     assert [s.name for s in settings_of(config) if not s.doc] == []
+
+
+@pytest.mark.parametrize("task", task_names())
+def test_no_two_settings_of_a_task_say_the_same(task):
+    docs = [s.doc for s in settings_of(get_task(task).config())]
+    assert sorted(set(docs)) == sorted(docs)
 
 
 @pytest.mark.parametrize("task", task_names())
@@ -89,6 +103,37 @@ def test_wrong_flags_are_one_sentence(words, said):
 )
 def test_words_of_the_command_stay_with_it(text, rest, flags):
     assert divided(text.split(), ["--out"]) == (rest.split(), flags.split())
+
+
+@pytest.mark.parametrize(
+    ("flag", "shown"),
+    [
+        ("--on-overflow {stop,warn}", "stop"),
+        ("--loggers {wandb,rerun}...", "none"),
+        ("--env.weights NAME=VALUE...", "none"),
+        ("--ppo.actor-layers INT...", "256 128"),
+        ("--spread-ends {true,false}", "false"),
+        ("--ppo.learning-rate-min FLOAT", "1e-05"),
+        ("--env.rewards TEXT", "footprint"),
+    ],
+)
+def test_defaults_are_shown_as_they_would_be_typed(flag, shown, help_of_crawl):
+    _, _, behind = help_of_crawl.partition(flag)
+    default = behind.partition("(default: ")[2].partition(")")[0]
+    assert behind and default == shown
+
+
+def test_a_mapping_and_an_absent_value_are_shown_in_words():
+    found = settings_of(
+        Sweep("crawl", set={"ppo.actor_layers": (16,), "iterations": 3})
+    )
+    shown = {s.name: _shown(s.default) for s in found if s.name in ("set", "hand")}
+    assert shown["set"] == ("ppo.actor_layers=[16]", "iterations=3")
+    assert shown["hand"] == ("none",)
+
+
+def test_ranges_are_whole_numbers_where_they_are_whole(help_of_crawl):
+    assert ">= 1 <= 1048576." in help_of_crawl and "e+0" not in help_of_crawl
 
 
 def test_a_dry_run_prints_what_reads_back(tmp_path, capsys):

@@ -50,6 +50,14 @@ def test_elsewhere_than_in_a_checkout_the_command_is_pip(monkeypatch, machine):
     assert '(pip install "fingers-mjx[cuda12]")' in (idle_gpu(None, {}, machine) or "")
 
 
+@pytest.mark.parametrize(("path", "uv"), [("/bin/uv", "uv"), (None, ".uv/bin/uv")])
+def test_other_extras_are_added_by_the_uv_that_make_uses(monkeypatch, path, uv):
+    """Not by pip, which an environment that uv made does not have."""
+    monkeypatch.setattr(gpu.shutil, "which", lambda name: path)
+    assert gpu.install_command("wandb") == f"{uv} sync --inexact --extra wandb"
+    assert gpu.install_command("cuda13") == "make cuda13"
+
+
 def test_cuda_without_warp_leaves_the_physics_behind(monkeypatch, machine):
     install(monkeypatch, cuda=True, warp=False)
     assert "Warp is not installed" in (idle_gpu(None, {}, machine) or "")

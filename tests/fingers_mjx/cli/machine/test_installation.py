@@ -24,6 +24,7 @@ from fingers_mjx.cli.machine.installation import (
     check_places,
     check_python,
     check_requirement,
+    version,
 )
 from fingers_mjx.cli.main import main
 
@@ -220,6 +221,20 @@ def requirements():
             *table.get("dependency-groups", {}).values(),
         ]
         yield from (Requirement(text) for texts in lists for text in texts)
+
+
+def test_the_version_is_printed_from_a_checkout_and_from_metadata(capsys, tmp_path):
+    assert version() == version(tmp_path) == metadata.version("fingers-mjx")
+    with pytest.raises(SystemExit) as done:
+        main(["--version"])
+    assert done.value.code == 0
+    assert capsys.readouterr().out == f"fingers-mjx {version()}\n"
+
+
+def test_a_copy_without_metadata_has_no_version(monkeypatch, tmp_path):
+    without_ours(monkeypatch)
+    with pytest.raises(UnsupportedInstallation, match="found nothing that says"):
+        version(tmp_path)
 
 
 def test_known_bad_versions_cannot_be_installed():

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import pytest
 
 from envs.errors import InputError
+from fingers_mjx.cli.machine.gpu import install_command
 from fingers_mjx.cli.main import main
 from fingers_mjx.ppo.config import TrainConfig, check_config
 from fingers_mjx.runs.loggers import choice
@@ -75,5 +76,5 @@ def test_one_that_is_not_installed_is_one_sentence(
     out = tmp_path / "run"
     assert main(["train", "crawl", "--out", str(out), "--loggers", "wandb"]) == 2
     said = capsys.readouterr().err
-    assert said == 'fingers: wandb is not installed; pip install "fingers-mjx[wandb]"\n'
+    assert said == f"fingers: wandb is not installed; {install_command('wandb')}\n"
     assert not out.exists()
