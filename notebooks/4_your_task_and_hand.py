@@ -35,8 +35,9 @@ import numpy as np
 from envs.commands import CommandConfig
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from envs.hand.importing.convert import import_hand
-from envs.hand.model import build_spec
+from envs.hand.importing.joint_map import DriveMap, JointMap
 from envs.hand.stance import stance_of
+from envs.hand.stance_search import with_stance
 from envs.registry import Task, register
 from envs.task import HandSettings, HandTask
 from envs.tasks.upright import near_stance
@@ -181,32 +182,77 @@ figure
 #
 # ## A hand
 #
-# `fingers hand import MODEL.xml --out my_hand.yaml` turns an MJCF model into a hand
-# file; here in Python, with the model of the default hand, written as a file of its
-# own. What the model does not say is taken from the default hand, and noted.
+# `fingers hand import MODEL.xml --joint-map MAP.yaml -o my_hand.yaml` turns an MJCF
+# model into a hand file; here in Python. The model is one that has little in common
+# with the default hand: four fingers of three joints, of capsules, on a flat palm.
 
 # %%
-default = load_hand_file()
-spec = build_spec(default)
-spec.compile()
-Path("my_hand.xml").write_text(spec.to_xml())
-found = import_hand("my_hand.xml")
+FINGER = """
+<body name="{name}_base" pos="{x} {y} 0">
+  <joint name="{name}_1" axis="0 {s}1 0" range="-0.3 1.6"/>
+  <geom fromto="0 0 0 {s}0.012 0 0" mass="0.012"/>
+  <body pos="{s}0.014 0 0">
+    <joint name="{name}_2" axis="0 0 1" range="-0.5 0.5"/>
+    <geom fromto="{s}0.004 0 0 {s}0.045 0 0" mass="0.022"/>
+    <body pos="{s}0.05 0 0">
+      <joint name="{name}_3" axis="0 {s}1 0" range="-0.3 1.6"/>
+      <geom fromto="{s}0.004 0 0 {s}0.042 0 0" mass="0.018"/>
+    </body>
+  </body>
+</body>"""
+WHERE = {
+    "thumb": (-0.045, 0.0),
+    "index": (0.05, 0.036),
+    "middle": (0.054, 0.0),
+    "ring": (0.05, -0.036),
+}
+JOINTS = {finger: tuple(f"{finger}_{k}" for k in (1, 2, 3)) for finger in WHERE}
+
+
+def mjcf():
+    """The model as text."""
+    bodies = "".join(
+        FINGER.format(name=name, x=x, y=y, s="" if x > 0 else "-")
+        for name, (x, y) in WHERE.items()
+    )
+    motors = "".join(
+        f'<position name="{joint}" joint="{joint}"/>'
+        for joints in JOINTS.values()
+        for joint in joints
+    )
+    return f"""<mujoco><compiler angle="radian" autolimits="true"/>
+<default><joint armature="0.001" damping="0.02"/>
+<position kp="4" kv="0.08" forcerange="-0.8 0.8"/>
+<geom type="capsule" size="0.008"/></default>
+<worldbody><body name="palm"><freejoint/>
+<geom type="box" size="0.045 0.045 0.012" mass="0.22"/>{bodies}</body></worldbody>
+<actuator>{motors}</actuator></mujoco>"""
+
+
+Path("my_hand.xml").write_text(mjcf())
+mapped = JointMap(fingers=JOINTS, drive=DriveMap(speed_limit=4.0))
+found = import_hand("my_hand.xml", mapped)
 print("\n".join(found.notes))
 
 # %% [markdown]
-# The stance is settled anew for it, and a hand that does not stand is refused by name.
-# Then it trains like the default one: `fingers train crawl --hand my_hand.yaml`.
+# Nobody knows how such a hand stands: a stance is searched, settled and kept in the
+# hand file, and a hand for which none is found is refused. Then it trains like the
+# default one: `fingers train crawl --hand my_hand.yaml`. Both hands in their stances,
+# from the left:
 
 # %%
-save_hand_file(found.hand, Path("my_hand.yaml"))
-mine = load_hand_file(Path("my_hand.yaml"))
-shown = pictures(posed(mine, stance_of(mine)))
+hand = with_stance(found.hand, starts=4 if FAST else 40)
+save_hand_file(hand, Path("my_hand.yaml"))
 figure, panels = panels_of(2, (9.6, 3.7))
-for panel, side in zip(panels, ("left", "front"), strict=True):
-    panel.imshow(shown[side])
+mine = load_hand_file(Path("my_hand.yaml"))
+for panel, (name, hand) in zip(
+    panels, {"mine": mine, "the default hand": load_hand_file()}.items(), strict=True
+):
+    panel.imshow(pictures(posed(hand, stance_of(hand)))["left"])
+    panel.set_title(name)
     panel.axis("off")
 figure
 
 # %% [markdown]
-# What is taken from a model, how joints get their names (`--joint-map`), and what a
-# hand must have is in `docs/guides/hand.md`.
+# What is taken from a model, how its joints are named, and what a hand must have is in
+# `docs/guides/hand.md`; `examples/second_hand` trains such a hand, and the LEAP hand.
