@@ -2,12 +2,14 @@
 
 Exit status: 0 done; 2 bad input; 3 learning diverged; 4 no room on the disk; 5 a sweep
 that is over and lacks members; 6 an installation that cannot work; 75 stopped by a
-signal after a checkpoint, go on with --resume; 130 stopped by the keyboard.
+signal after a checkpoint, go on with --resume; 130 stopped by the keyboard; 141 nobody
+reads what it prints, as after `| head`.
 """
 
 import argparse
 import importlib
 import os
+import select
 import sys
 from collections.abc import Sequence
 
@@ -41,7 +43,7 @@ COMMANDS = (
 SYSID = ("info", "describe", "excite", "calibrate", "diagnose", "transfer")
 """Modules of the commands, and of the actions of `fingers sysid`."""
 
-BAD_INPUT, KEYBOARD = 2, 130
+BAD_INPUT, KEYBOARD, NO_READER = 2, 130, 141
 """Here, since `envs` may be a foreign package until `check_places` has looked."""
 _EXTRAS = {
     module: extra
@@ -100,28 +102,58 @@ def main(argv: Sequence[str] | None = None) -> int:
     args = argparse.Namespace(flags=())
     try:
         if words == ["doctor"]:  # it says what is wrong where nothing else can run
-            return doctor.run()
+            return _printed(doctor.run())
         check_places()
         args = make_parser().parse_args(words)
         refuse_empty(args)
         check_installation()
         args.check(args)
         _note_idle_gpu(args)
-        if args.dry_run:
-            print(args.preview(args), end="")
-            return 0
-        if args.needs_jax:
-            prepare_jax()
-        return args.run(args)
+        return _printed(_run(args))
+    except SystemExit:  # after --help or --version
+        _unread()
+        raise
     except KeyboardInterrupt:
         return _say("stopped", KEYBOARD)
     except Exception as error:
+        if isinstance(error, BrokenPipeError) and _unread():
+            return NO_READER
         status = _status(error)
         if status is None:
             raise
         if isinstance(error, InputError):
             error = as_typed(error, args.flags)
         return _say(_sentence(error), status)
+
+
+def _run(args: argparse.Namespace) -> int:
+    """Runs a command that has been checked, or shows what it would do."""
+    if args.dry_run:
+        print(args.preview(args), end="")
+        return 0
+    if args.needs_jax:
+        prepare_jax()
+    return args.run(args)
+
+
+def _printed(status: int) -> int:
+    """Returns an exit status when all that was printed has been taken."""
+    sys.stdout.flush()
+    return status
+
+
+def _unread() -> bool:
+    """Whether nobody reads stdout any more; what it still holds is then dropped."""
+    try:
+        place = sys.stdout.fileno()
+    except OSError:  # in a test, or a notebook, which has no pipe
+        return False
+    ends = select.poll()
+    ends.register(place, 0)
+    if not any(event & (select.POLLERR | select.POLLHUP) for _, event in ends.poll(0)):
+        return False
+    os.dup2(os.open(os.devnull, os.O_WRONLY), place)
+    return True
 
 
 def _note_idle_gpu(args: argparse.Namespace) -> None:

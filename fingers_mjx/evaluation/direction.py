@@ -2,6 +2,7 @@
 
 A measure that is not listed has no better direction: it describes, as the mean command
 does, or its meaning depends on others, as energy does on how long an episode lasts.
+The first of a task is its main one.
 """
 
 from collections.abc import Mapping
@@ -9,7 +10,7 @@ from typing import Literal
 
 Better = Literal["higher", "lower"]
 
-_STANDING: dict[str, Better] = {"survival": "higher", "undesired_contact_rate": "lower"}
+STANDING: dict[str, Better] = {"survival": "higher", "undesired_contact_rate": "lower"}
 """Of every task that begins and should stay on the fingertips, also a user's own."""
 
 _SIDES = ("", "_thumb", "_wrist")
@@ -24,7 +25,7 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         "worst_tip_planting_fraction": "higher",
         "cost_of_transport": "lower",
         "turn_rate_error_rad_s": "lower",
-        **_STANDING,
+        **STANDING,
         # Of a hand that is commanded to walk straight on; drifts by their size.
         "drift_deg_s": "lower",
         "sideways_mps": "lower",
@@ -40,18 +41,18 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         "stray_presses": "lower",
         "max_tilt_deg": "lower",
         "stance_drift_mm": "lower",
-        **_STANDING,
+        **STANDING,
     },
     "push": {
-        "stopped": "lower",
         "delivered": "higher",
+        "stopped": "lower",
         "delivered_to_20_cm": "higher",
         "delivered_20_to_30_cm": "higher",
         "delivered_from_30_cm": "higher",
         "delivery_time_s": "lower",
         "final_error_m": "lower",
         "last_error_m": "lower",
-        **_STANDING,
+        **STANDING,
     },
     "recovery": {
         **{f"righted{side}": "higher" for side in _SIDES},
@@ -68,4 +69,4 @@ def better(task: str, measure: str) -> Better | None:
         task: by name; one that is not ours has what every standing hand has.
         measure: by name.
     """
-    return BETTER.get(task, _STANDING).get(measure)
+    return BETTER.get(task, STANDING).get(measure)

@@ -7,6 +7,7 @@ from envs.config.strict_yaml import MAX_YAML_BYTES, parse_yaml
 from envs.errors import InputError
 from fingers_deploy.files import read_regular
 from fingers_mjx.runs.directory import CONFIG_FILE, RUN_FILE
+from fingers_mjx.runs.members import MEMBERS
 from fingers_mjx.runs.settings import Settings, load_settings, overridden, run_settings
 
 
@@ -24,7 +25,8 @@ def check_run(path: Path) -> None:
     """Raises InputError if `path` is no run directory."""
     if not is_run(path):
         found = "a directory without a run" if path.is_dir() else "no directory"
-        raise InputError(path, "", found, "a directory made by fingers train")
+        valid = _members_of(path) or "a directory made by fingers train"
+        raise InputError(path, "", found, valid)
 
 
 def check_kind(path: Path) -> None:
@@ -35,7 +37,8 @@ def check_kind(path: Path) -> None:
     if not path.exists():
         raise InputError(path, "", "no such file or directory", valid)
     if path.is_dir() and not (_has_policy(path) or is_run(path)):
-        raise InputError(path, "", f"a directory without {POLICY_FILE}", valid)
+        found = f"a directory without {POLICY_FILE}"
+        raise InputError(path, "", found, _members_of(path) or valid)
 
 
 def check_policy(path: Path, assignments: Sequence[str]) -> None:
@@ -87,6 +90,12 @@ def saved_settings(path: Path) -> Settings:
     if not isinstance(task, str):
         raise InputError(file, "train.task", task, "the name of a task")
     return load_settings(file, task)
+
+
+def _members_of(path: Path) -> str:
+    """Names the run directories of a population, empty if it is none."""
+    directory = path / MEMBERS
+    return f"one of its members, {directory / '00'} …" if directory.is_dir() else ""
 
 
 def _has_policy(path: Path) -> bool:

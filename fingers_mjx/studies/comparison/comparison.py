@@ -8,11 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from envs.errors import InputError, one_of
+from fingers_deploy.errors import shortened
 from fingers_mjx.evaluation.direction import Better, better
 from fingers_mjx.studies.comparison.results import Missing, Results
 from fingers_mjx.studies.statistics.compare import Arm, Difference, arm, difference
 from fingers_mjx.studies.statistics.pairs import pair
 from fingers_mjx.studies.statistics.significance import holm
+from fingers_mjx.studies.sweep.manifest import number_of
+
+MOST_NAMES, MOST_LETTERS = 6, 60
+"""Of members that are missing: how many a sentence names, and letters of a reason."""
 
 
 @dataclass(frozen=True)
@@ -96,9 +101,8 @@ def check_complete(results: Results, source: object) -> None:
         InputError: naming the members that are missing.
     """
     if results.missing:
-        names = ", ".join(missing.name for missing in results.missing)
-        found = f"{len(results.missing)} of {results.members} members missing: {names}"
-        valid = "all members done, or --allow-partial to leave their seeds out"
+        found = f"{len(results.missing)} of {number_of(results.members)} missing"
+        valid = f"all done, or --allow-partial; missing: {_named(results.missing)}"
         raise InputError(source, "", found, valid)
 
 
@@ -153,6 +157,14 @@ def corrected(rows: Sequence[Row]) -> list[Row]:
         dataclasses.replace(row, p_holm=_known(p))
         for row, p in zip(rows, together, strict=True)
     ]
+
+
+def _named(missing: Sequence[Missing]) -> str:
+    """Names the first members that are missing, and says why the first is."""
+    names = ", ".join(one.name for one in missing[:MOST_NAMES])
+    more = len(missing) - MOST_NAMES
+    names += f" and {more} more" if more > 0 else ""
+    return f"{names}; {missing[0].name}: {shortened(missing[0].reason, MOST_LETTERS)}"
 
 
 def _chosen(results: Results, measures: Sequence[str] | None) -> tuple[str, ...]:

@@ -6,7 +6,7 @@ and `sweep` once a minute.
 
 import json
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
@@ -45,7 +45,7 @@ def display(stream: TextIO, root: Path) -> Iterator[Display]:
         root: directory of the sweep.
     """
     if not stream.isatty():
-        with Ticker(lambda tick: _print(stream, _whole(root)), LINE_EVERY_S):
+        with Ticker(lambda tick: _tick(stream, root), LINE_EVERY_S):
             yield Display(
                 lambda event: _print(stream, event),
                 lambda member: _print(stream, _row(member)),
@@ -70,6 +70,12 @@ def live_table(stream: TextIO, root: Path) -> Iterator[Console]:
 def _found(root: Path) -> list[Standing]:
     """Returns how the sweep stands; nothing before it has begun."""
     return standings(root) if (root / MANIFEST_FILE).exists() else []
+
+
+def _tick(stream: TextIO, root: Path) -> None:
+    """Prints how all stands; a reader that is gone is met by the next other line."""
+    with suppress(BrokenPipeError):
+        _print(stream, _whole(root))
 
 
 def _whole(root: Path) -> Event:

@@ -89,6 +89,11 @@ def waiting(key: Key, stages: Iterable[str], root: Path) -> Member:
     return Member(*key, "waiting", "", 0, names[0], 0, run.as_posix())
 
 
+def number_of(members: int) -> str:
+    """Returns a number of members in words."""
+    return f"{members} member" + "s" * (members != 1)
+
+
 def read_manifest(directory: Path) -> Manifest:
     """Reads the manifest of a sweep directory.
 

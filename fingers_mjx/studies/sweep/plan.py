@@ -77,25 +77,6 @@ def trainings(spec: Sweep, root: Path, key: Key) -> list[Training]:
     ]
 
 
-def check_sweep(spec: Sweep, root: Path, source: Path) -> None:
-    """Raises InputError at the first setting of any member that cannot work.
-
-    Args:
-        spec: resolved.
-        root: directory of the sweep.
-        source: file of the specification, which errors name.
-    """
-    seed = seed_list(spec.seeds)[0]
-    try:
-        for configuration in spec.configurations:
-            last = trainings(spec, root, Key(configuration, seed))[-1]
-            _overridden(last.setup, {"evaluate.set": spec.evaluate.set})
-    except InputError as error:
-        if error.source != SETTINGS:
-            raise
-        raise InputError(source, error.field, error.found, error.valid) from error
-
-
 def _setup(spec: Sweep, root: Path, key: Key, stage: Stage) -> Setup:
     """Returns the settings of one stage; a configuration's count before a stage's."""
     own = dict(spec.configurations[key.configuration])
@@ -108,11 +89,15 @@ def _setup(spec: Sweep, root: Path, key: Key, stage: Stage) -> Setup:
         f"stages.{stage.name}.set": stage.set,
         f"configurations.{key.configuration}": own,
     }
-    return _overridden(setup, places)
+    return overridden_at(setup, places)
 
 
-def _overridden(setup: Setup, places: dict[str, Overrides]) -> Setup:
+def overridden_at(setup: Setup, places: dict[str, Overrides]) -> Setup:
     """Returns `setup` with settings, those of later places before earlier ones.
+
+    Args:
+        setup: what is changed.
+        places: place in the sweep to the settings that stand there.
 
     Raises:
         InputError: names the place in the sweep that a setting came from.
@@ -121,9 +106,15 @@ def _overridden(setup: Setup, places: dict[str, Overrides]) -> Setup:
     try:
         return overridden(setup, assignments(settings))
     except InputError as error:
-        given = [place for place, of in places.items() if error.field in of]
+        given = [p for p, of in places.items() if _sets(of, error.field)]
         field = ".".join([*given[-1:], error.field])
         raise InputError(SETTINGS, field, error.found, error.valid) from error
+
+
+def _sets(of: Overrides, field: str) -> bool:
+    """Whether settings set a field, a part of it, or what it is a part of."""
+    whole = f"{field}."
+    return any(whole.startswith(f"{n}.") or n.startswith(whole) for n in of)
 
 
 def assignments(settings: Overrides) -> list[str]:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from envs.config.json_file import read_table
 from envs.errors import InputError, one_of
-from fingers_mjx.evaluation.direction import BETTER, Better, better
+from fingers_mjx.evaluation.direction import BETTER, STANDING, Better, better
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.studies.sweep.manifest import Manifest, Member
 from fingers_mjx.studies.sweep.plan import Key
@@ -29,11 +29,11 @@ def promoted(spec: Sweep, root: Path, manifest: Manifest) -> list[Key]:
     """
     if spec.promote is None:
         return []
-    seeds = seed_list(spec.seeds)
+    seeds, by = seed_list(spec.seeds), measure(spec, root)
     found: dict[str, list[float]] = {}
     for member in manifest.members:
         if member.state == "done" and member.seed in seeds:
-            value = _measure(root, member, spec.promote.by)
+            value = _measure(root, member, by)
             found.setdefault(member.configuration, []).append(value)
     best = _best(found, spec.promote.top, check_promotion(spec, root))
     more = seed_list(spec.promote.seeds, max(seeds))
@@ -61,17 +61,40 @@ def check_promotion(spec: Sweep, source: Path) -> Better:
     """Returns which direction of the measure is better, by which is promoted.
 
     Raises:
-        InputError: it is neither known nor given.
+        InputError: it is neither known nor given, or promotion has a seed of the sweep.
     """
     promote = spec.promote
     if promote is None:
         return "higher"
-    found = promote.better or better(spec.task, promote.by)
+    chose = seed_list(spec.seeds)
+    if common := set(chose) & set(seed_list(promote.seeds, max(chose))):
+        shown = ", ".join(map(str, sorted(common)))
+        valid = "seeds other than those of the sweep"
+        raise InputError(source, "promote.seeds", shown, valid)
+    by = measure(spec, source)
+    found = promote.better or better(spec.task, by)
     if found is None:
-        known = BETTER.get(spec.task, {})
-        valid = f"{one_of(known, promote.by)}; or any measure with better: higher|lower"
-        raise InputError(source, "promote.by", promote.by, valid)
+        raise _unknown(spec.task, source, by)
     return found
+
+
+def measure(spec: Sweep, source: Path) -> str:
+    """Returns the measure by which is promoted, the task's main one if not given.
+
+    Raises:
+        InputError: none is given, and the task has none.
+    """
+    given = spec.promote.by if spec.promote else None
+    by = given or next(iter(BETTER.get(spec.task, ())), None)
+    if by is None:
+        raise _unknown(spec.task, source, "")
+    return by
+
+
+def _unknown(task: str, source: Path, by: str) -> InputError:
+    known = one_of(BETTER.get(task, STANDING), by)
+    valid = f"{known}; or any measure with better: higher|lower"
+    return InputError(source, "promote.by", by, valid)
 
 
 def _best(found: Mapping[str, list[float]], top: int, direction: Better) -> list[str]:

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from fingers_mjx.studies.sweep.manifest import Manifest, Member
+from fingers_mjx.studies.sweep.manifest import Manifest, Member, number_of
 from fingers_mjx.studies.sweep.outcome import last_lines
 from fingers_mjx.studies.sweep.plan import LOG_FILE
 
@@ -17,7 +17,8 @@ def report(root: Path, manifest: Manifest) -> list[str]:
         manifest: at the end.
     """
     members, missing = manifest.members, manifest.missing()
-    lines = [f"{len(members) - len(missing)} of {len(members)} members done"]
+    done = len(members) - len(missing)
+    lines = [f"{done} of {number_of(len(members))} done"]
     for name in manifest.configurations:
         own = [m for m in members if m.configuration == name]
         done = [m for m in own if m.state == "done"]

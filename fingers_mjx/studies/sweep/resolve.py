@@ -21,8 +21,8 @@ from envs.hand.hand_file import hand_yaml, load_hand_file
 from fingers_deploy import load_bundle
 from fingers_deploy.errors import shortened
 from fingers_mjx.runs.directory import flat
-from fingers_mjx.studies.sweep.plan import check_sweep
-from fingers_mjx.studies.sweep.promote import check_promotion
+from fingers_mjx.studies.sweep.check import check_sweep, check_words
+from fingers_mjx.studies.sweep.promote import check_promotion, measure
 from fingers_mjx.studies.sweep.search import Overrides, gridded, sampled
 from fingers_mjx.studies.sweep.spec import Sweep, free_names, seed_list
 
@@ -45,15 +45,19 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
         The sweep and the files to be kept, by their names in it.
 
     Raises:
-        InputError: a hand file that cannot be read, or configurations by two ways with
-            the same name.
+        InputError: a hand file that cannot be read, configurations by two ways with the
+            same name, or promotion by a measure that must be named.
         BundleError: a damaged bundle.
     """
     files: dict[str, bytes] = {}
 
-    def kept(path: Any) -> str | None:
+    def kept(path: Any, field: str) -> str | None:
         if path is None:
             return None
+        if not isinstance(path, str):
+            valid = "text: the name of a hand file, or null"
+            found = list(path) if isinstance(path, tuple) else path
+            raise InputError(source, field, found, valid)
         hand = load_hand_file(source.parent / path)
         name = f"{HANDS}/{hand.sha256[:12]}.yaml"
         files[name] = hand_yaml(hand).encode()
@@ -67,24 +71,33 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
         files[name] = model
         return name
 
-    backend = spec.backend or backend
+    def with_hand(name: str, settings: Overrides) -> Overrides:
+        if "hand" not in settings:
+            return settings
+        field = f"configurations.{name}.hand"
+        return {**settings, "hand": kept(settings["hand"], field)}
+
+    backend, promote = spec.backend or backend, spec.promote
+    if promote is not None:
+        promote = dataclasses.replace(promote, by=measure(spec, source))
     engine = spec.engine or ("population" if backend == "warp" else "local")
     all_cores = engine == "population" or backend == "warp"
     evaluate = spec.evaluate
     made = dataclasses.replace(
         spec,
         preset=spec.preset or ("fast" if backend == "warp" else "cpu"),
-        hand=kept(spec.hand),
+        hand=kept(spec.hand, "hand"),
         backend=backend,
         warm_start=kept_policy(spec.warm_start),
         configurations={
-            name: {k: kept(v) if k == "hand" else v for k, v in settings.items()}
+            name: with_hand(name, settings)
             for name, settings in _configurations(spec, source).items()
         },
         search=None,
         grid=None,
         seeds=seed_list(spec.seeds),
         evaluate=dataclasses.replace(evaluate, backend=evaluate.backend or backend),
+        promote=promote,
         engine=engine,
         threads=spec.threads or (None if all_cores else 1),
     )
@@ -125,7 +138,9 @@ def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
     """
     saved = saved_sweep(root)
     backend = written.backend or (saved.backend if saved else None)
-    spec, files = resolved(written, source, backend or machine_backend())
+    backend = backend or machine_backend()
+    check_words(written, source, backend)
+    spec, files = resolved(written, source, backend)
     if saved is None:
         _check_empty(root)
     else:

@@ -11,7 +11,7 @@ from fingers_mjx.runs.directory import locked
 from fingers_mjx.runs.files import OutOfSpace
 from fingers_mjx.studies.sweep.book import Book
 from fingers_mjx.studies.sweep.engines.engine import Engine, Job
-from fingers_mjx.studies.sweep.manifest import Manifest
+from fingers_mjx.studies.sweep.manifest import Manifest, number_of
 from fingers_mjx.studies.sweep.outcome import outcome
 from fingers_mjx.studies.sweep.plan import Key
 from fingers_mjx.studies.sweep.promote import promoted
@@ -152,4 +152,4 @@ def _note_ended(book: Book, running: _Running) -> None:
 def _stopped(book: Book) -> str:
     number = len(book.manifest.members)
     done = number - len(book.manifest.missing())
-    return f"stopped with {done} of {number} members done; the same command goes on"
+    return f"stopped with {done} of {number_of(number)} done; the same command goes on"

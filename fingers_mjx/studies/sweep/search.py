@@ -52,6 +52,8 @@ class Search:
     seed: int = field(default=0, metadata=limits("1", 0, 2**32 - 1))
 
     def __post_init__(self) -> None:
+        if not self.space:
+            raise InputError("search", "space", "no setting", "one or more")
         for name, values in self.space.items():
             if values == ():
                 raise InputError("search", f"space.{name}", "no value", "one or more")

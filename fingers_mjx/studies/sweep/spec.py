@@ -69,15 +69,17 @@ class Promotion:
     """Which configurations are trained on more seeds when all others are done.
 
     Attributes:
-        by: measure of the evaluation; its mean over the seeds counts.
+        by: measure of the evaluation, whose mean over the seeds counts; the task's main
+            one (the first in `fingers_mjx.evaluation.direction`), if not given.
         top: number of configurations.
         seeds: a list, or how many; a number means so many seeds after the largest of
-            the sweep. What chose the best says too much good of it; new seeds do not.
+            the sweep, none of which may be listed. What chose the best says too much
+            good of it; new seeds do not.
         better: whether higher or lower is; of measures whose direction is known
             (`fingers_mjx.evaluation.direction`) that one, if not given.
     """
 
-    by: str
+    by: str | None = None
     top: int = field(default=3, metadata=limits("1", 1, 2**20))
     seeds: Seeds = field(default=6, metadata=_SEEDS)
     better: Better | None = None
@@ -139,6 +141,8 @@ class Sweep:
     def __post_init__(self) -> None:
         _check_names(self)
         _check_seeds("seeds", self.seeds)
+        if self.grid is not None and not self.grid:
+            raise InputError("sweep", "grid", "no setting", "one or more")
         if self.promote is not None:
             _check_seeds("promote.seeds", self.promote.seeds)
         places = {"set": self.set}

@@ -1,6 +1,8 @@
 """How a sweep stands: manifest and learning curves of its members, as table or JSON."""
 
 import dataclasses
+import fcntl
+import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,11 +12,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from envs.errors import InputError
-from fingers_mjx.runs.directory import locked
 from fingers_mjx.runs.metrics import last_row
 from fingers_mjx.studies.sweep.book import advanced
-from fingers_mjx.studies.sweep.manifest import Member, read_manifest
+from fingers_mjx.studies.sweep.manifest import Member, number_of, read_manifest
 from fingers_mjx.studies.sweep.resolve import LOCK_FILE
 from fingers_mjx.training.progress_table import clock, shown
 
@@ -26,6 +26,8 @@ COLORS = {
     "done": "green",
 }
 """Colours of the states, in the order in which a table shows them."""
+STOPPED = "stopped; the same command goes on"
+"""Why a member waits that ran when its sweep ended."""
 
 
 @dataclass(frozen=True)
@@ -59,20 +61,31 @@ class Standing:
 def standings(root: Path) -> list[Standing]:
     """Returns how the members of a sweep stand.
 
+    What a killed sweep had running waits for the next start.
+
     Raises:
         InputError: there is no sweep.
     """
     manifest = read_manifest(root)
-    return [_standing(root, member, manifest.stages) for member in manifest.members]
+    members = list(manifest.members)
+    if not in_progress(root):
+        members = [_stopped(m, root, manifest.stages) for m in members]
+    return [_standing(root, member, manifest.stages) for member in members]
 
 
 def in_progress(root: Path) -> bool:
-    """Whether a process works on the sweep."""
+    """Whether a process works on the sweep, in whose directory nothing is written."""
     try:
-        with locked(root / LOCK_FILE, ""):
-            return False
-    except InputError:
+        handle = os.open(root / LOCK_FILE, os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
         return True
+    finally:
+        os.close(handle)
+    return False
 
 
 def table(found: list[Standing]) -> RenderableType:
@@ -98,7 +111,15 @@ def counts(found: list[Standing]) -> str:
     words = [f"{number[state]} {state}" for state in COLORS if number[state]]
     speed = sum(one.steps_per_s or 0.0 for one in found)
     words += [f"{speed:,.0f} steps/s"] if speed else []
-    return f"{len(found)} members: {', '.join(words)}"
+    return f"{number_of(len(found))}: {', '.join(words)}"
+
+
+def _stopped(member: Member, root: Path, stages: tuple[str, ...]) -> Member:
+    """Returns a member of a sweep on which no process works."""
+    if member.state != "running":
+        return member
+    member = advanced(member, root, stages)
+    return dataclasses.replace(member, state="waiting", reason=STOPPED)
 
 
 def _standing(root: Path, member: Member, stages: tuple[str, ...]) -> Standing:

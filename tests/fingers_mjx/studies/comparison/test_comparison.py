@@ -63,7 +63,9 @@ def test_measures_without_a_direction_are_compared_only_when_named(tmp_path):
 def test_seeds_that_are_missing_are_dropped_pairwise_and_named(tmp_path):
     states = {("lift", 3): ("diverged", "loss not finite")}
     whole = results(tmp_path, study(GAINS), states)
-    with pytest.raises(InputError, match="1 of 15 members missing: lift/3"):
+    with pytest.raises(
+        InputError, match=r"1 of 15 members missing.*missing: lift/3; lift/3: diverged"
+    ):
         check_complete(whole, "s")
     found = compared(whole, "base", [SPEED])
     lift, same = found.rows
@@ -73,6 +75,18 @@ def test_seeds_that_are_missing_are_dropped_pairwise_and_named(tmp_path):
     said = "\n".join(notes(found))
     assert "lift/3, diverged" in said
     assert "left out" in said
+
+
+def test_six_of_many_that_are_missing_are_named_whole_and_why_the_first_is(tmp_path):
+    path = write_sweep(tmp_path / "s", study(GAINS))
+    for file in path.rglob("summary.json"):
+        file.write_text("{")
+    whole = read_results(path, read_manifest(path))
+    with pytest.raises(InputError, match="15 of 15 members missing") as error:
+        check_complete(whole, "/home/somebody/work/studies/of/the/hand/" + 60 * "s")
+    names = ", ".join(one.name for one in whole.missing[:6])
+    assert f"missing: {names} and 9 more; base/0: done, but its" in str(error.value)
+    assert str(error.value).endswith("cannot be read")
 
 
 def test_one_seed_proves_nothing(tmp_path):

@@ -59,6 +59,7 @@ def test_a_grid_is_every_combination_once():
         ({"space": {"x": {"low": 0.0, "high": 1.0, "log": True}}}, "space.x.low"),
         ({"space": {"x": []}}, "space.x"),
         ({"space": {"x": {"lo": 0.0, "high": 1.0}}}, "space.x.lo"),
+        ({"space": {}}, "space"),
         ({"samples": 0}, "samples"),
         ({"sample": 3}, "sample"),
     ],

@@ -45,7 +45,9 @@ def test_what_may_change_between_starts():
         ({"set": {"hand": "x.yaml"}}, "set.hand", "setting"),
         ({"set": {"backend": "jax"}}, "set.backend", "setting"),
         ({"evaluate": {"set": {"num_envs": 3}}}, "evaluate.set.num_envs", "env.FIELD"),
-        ({"promote": {"top": 3}}, "promote.by", "text"),
+        ({"grid": {}}, "grid", "no setting"),
+        ({"search": {"samples": 4, "space": {}}}, "search.space", "no setting"),
+        ({"search": {"samples": 4, "seed": 0}}, "search.space", "mapping"),
         ({"promote": {"by": "x", "seeds": 0}}, "promote.seeds", "no seed"),
     ],
 )

@@ -12,6 +12,8 @@ from envs.errors import InputError
 from fingers_mjx.cli.main import main
 from fingers_mjx.studies.sweep.display import display
 from fingers_mjx.studies.sweep.manifest import read_manifest, write_manifest
+from fingers_mjx.studies.sweep.report import report
+from fingers_mjx.studies.sweep.resolve import LOCK_FILE
 from fingers_mjx.studies.sweep.run import sweep_lock
 from fingers_mjx.studies.sweep.status import counts, in_progress, standings, table
 
@@ -32,7 +34,8 @@ def root(tmp_path_factory):
 
 
 def test_a_running_member_stands_where_its_curve_is(root):
-    found = {str(one.member.key): one for one in standings(root)}
+    with sweep_lock(root):
+        found = {str(one.member.key): one for one in standings(root)}
     one = found["lift/1"]
     assert (one.member.iterations, one.iterations) == (7, 30)
     assert (one.steps_per_s, one.eta_s) == (1234.0, 61.0)
@@ -43,12 +46,33 @@ def test_a_running_member_stands_where_its_curve_is(root):
 
 def test_the_table_shows_what_runs_first_and_why_others_do_not(root):
     console = Console(file=io.StringIO(), width=120)
-    console.print(table(standings(root)))
+    with sweep_lock(root):
+        console.print(table(standings(root)))
     lines = console.file.getvalue().splitlines()
     assert lines[2].split() == ["lift/1", "running", "train", "7/30", "1234", "0:01:01"]
     assert "plain/1" in lines[3] and "env.x: found 1" in lines[3]
     assert "the same seed would" in lines[4]
     assert lines[5].split()[:2] == ["plain/0", "done"]
+
+
+def test_what_ran_in_a_sweep_that_was_killed_waits(root):
+    (root / LOCK_FILE).unlink(missing_ok=True)
+    root.chmod(0o555)
+    try:
+        found = {str(one.member.key): one for one in standings(root)}
+    finally:
+        root.chmod(0o755)
+    one = found["lift/1"]
+    assert (one.member.state, one.member.iterations) == ("waiting", 7)
+    assert one.member.reason == "stopped; the same command goes on"
+    assert (one.steps_per_s, one.eta_s) == (None, None)
+    assert not (root / LOCK_FILE).exists()
+
+
+def test_one_member_is_one_member(root):
+    found = standings(root)
+    assert counts(found[:1]).startswith("1 member: ")
+    assert counts(found).startswith("4 members: ")
 
 
 def test_without_a_terminal_status_is_json_lines(root, capsys):
@@ -88,3 +112,9 @@ def test_the_display_is_a_table_on_a_terminal(root):
 def test_a_directory_without_a_sweep_is_refused(tmp_path):
     with pytest.raises(InputError, match="no sweep"):
         standings(tmp_path)
+
+
+def test_the_report_of_one_member_is_of_one_member(root):
+    manifest = read_manifest(root)
+    one = dataclasses.replace(manifest, members=manifest.members[:1])
+    assert report(root, one)[0] == "1 of 1 member done"
