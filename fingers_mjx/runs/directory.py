@@ -194,6 +194,21 @@ def locked(path: Path, valid: str) -> Iterator[None]:
         os.close(handle)
 
 
+def is_locked(path: Path) -> bool:
+    """Whether another process holds the lock file `path`; nothing is written."""
+    try:
+        handle = os.open(path, os.O_RDONLY)
+    except FileNotFoundError:
+        return False
+    try:
+        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return True
+    finally:
+        os.close(handle)
+    return False
+
+
 def flat(tree: Any, prefix: str = "") -> dict[str, Any]:
     """Returns the leaves of nested mappings by dotted name."""
     if not isinstance(tree, Mapping):

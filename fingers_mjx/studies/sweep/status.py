@@ -1,8 +1,6 @@
 """How a sweep stands: manifest and learning curves of its members, as table or JSON."""
 
 import dataclasses
-import fcntl
-import os
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from fingers_mjx.runs.directory import is_locked
 from fingers_mjx.runs.metrics import last_row
 from fingers_mjx.studies.sweep.book import advanced
 from fingers_mjx.studies.sweep.manifest import Member, number_of, read_manifest
@@ -75,17 +74,7 @@ def standings(root: Path) -> list[Standing]:
 
 def in_progress(root: Path) -> bool:
     """Whether a process works on the sweep, in whose directory nothing is written."""
-    try:
-        handle = os.open(root / LOCK_FILE, os.O_RDONLY)
-    except FileNotFoundError:
-        return False
-    try:
-        fcntl.flock(handle, fcntl.LOCK_SH | fcntl.LOCK_NB)
-    except BlockingIOError:
-        return True
-    finally:
-        os.close(handle)
-    return False
+    return is_locked(root / LOCK_FILE)
 
 
 def table(found: list[Standing]) -> RenderableType:

@@ -110,8 +110,8 @@ class Judge:
             model: fitted to the equations; itself, where its gains are known or the
                 angle alone was fitted.
         """
-        output, gains = self.output, self._unknown_gains(model)
-        if output is self.problem or not gains:
+        gains = self._unknown_gains()
+        if not gains or self.output is self.problem:
             return self
         if id(model) not in self.served:
             slots = list(self.problem.space.slots)
@@ -120,11 +120,11 @@ class Judge:
                 slots[i] = replace(slots[i], nominal=shown, prior_sd=sd)
             space = Space(tuple(slots))
             judge = Judge(replace(self.problem, space=space), self.base)
-            judge.output = replace(output, space=space)
+            judge.output = replace(self.output, space=space)
             self.served[id(model)] = (model, judge)
         return self.served[id(model)][1]
 
-    def _unknown_gains(self, model: Model) -> list[int]:
+    def _unknown_gains(self) -> list[int]:
         """Returns the coordinates of gains that are free, if the effort shows them."""
         if not self.problem.data.effort.all():
             return []

@@ -96,9 +96,10 @@ def _remaining(left: _Left) -> list[str]:
 
 def _no_nearer(found: Search) -> list[str]:
     """Finds causes that together do not lower the error of the simulated angle."""
-    judge, causes = found.judge.serving(found.best), found.best.effects
-    if not causes or not judge.sees:
+    causes = found.best.effects
+    if not causes or not found.judge.sees:
         return []
+    judge = found.judge.serving(found.best)
     if judge.t_value(judge.nominal(found.base), judge.moved(found.best)) > 0.0:
         return []
     return [f"with {' and '.join(causes)} the simulated motion comes no nearer"]
