@@ -114,9 +114,14 @@ def _rate(step) -> float:
 
 
 def _save(tab: Tab, picture: Path) -> None:
-    """Saves a picture of a hand that has walked for a while."""
-    time.sleep(8.0)
+    """Saves a picture of a hand that has walked for a while.
+
+    It stands still for it: a browser that draws in software is late with the arrows.
+    """
+    time.sleep(4.0)
     tab.value(f"{CLOSE}.forEach(button => button.click())")
+    tab.click("pause")
+    tab.wait_for("paused")
     time.sleep(2.0)
     image = Image.open(io.BytesIO(tab.picture())).convert("RGB")
     image.save(picture, quality=85)

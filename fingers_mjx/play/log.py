@@ -11,7 +11,7 @@ import jax
 import numpy as np
 from jaxtyping import Array, Float
 
-from envs.physics import PhysicsState
+from envs.physics.base import PhysicsState
 from fingers_deploy.rotations import multiply
 from fingers_mjx.play.player import Played, Player, Schedule
 from sysid.logs.log import MeasuredLog, make_log

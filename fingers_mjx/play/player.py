@@ -25,8 +25,7 @@ from envs.batch import BatchEnv
 from envs.hand.drive.drive import DriveState
 from envs.memory import Memory, PerWorldState
 from envs.observations import Sample
-from envs.physics import ModelFields, PhysicsOutput, PhysicsState
-from envs.physics.base import nominal_field
+from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState, nominal_field
 from fingers_deploy import Bundle, PolicyController
 from fingers_deploy.policy import Runtime
 from fingers_mjx.evaluation.record import Trace, record

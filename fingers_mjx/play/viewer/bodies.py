@@ -27,7 +27,7 @@ class Bodies:
         server: of the page.
         name: where they hang in the scene.
         model: whose geoms are drawn; planes are not.
-        colour: of all of them; their own if None.
+        colour: of all of them, which then cast no shadows; their own if None.
         opacity: 1 hides what is behind.
     """
 
@@ -52,7 +52,7 @@ class Bodies:
                 mesh.faces.astype(np.uint32),
                 color=colour or own,
                 opacity=opacity,
-                cast_shadow=opacity is None,
+                cast_shadow=colour is None,
             )
 
     def move(self, poses: Poses) -> None:

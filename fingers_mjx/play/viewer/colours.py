@@ -16,7 +16,8 @@ OKABE_ITO: tuple[Rgb, ...] = (
     (86, 180, 233),
 )
 """For fingers that look alike; the colour-blind see them differ."""
-FORCE: Rgb = (200, 20, 0)
+FORCE: Rgb = (160, 0, 15)
+"""No finger's, however a browser lights it."""
 PUSH: Rgb = (140, 40, 160)
 GHOST: Rgb = (60, 130, 220)
 AXES: tuple[Rgb, ...] = ((240, 0, 0), (0, 200, 0), (0, 0, 240))

@@ -148,7 +148,7 @@ def legend(ghost: str | None, colours: Sequence[Rgb]) -> str:
     """
     cm = 100 * FORCE_M_PER_N
     rows = [
-        _row([FORCE], f"force of the floor, {cm:g} cm per newton"),
+        _row([FORCE], f"forces on the hand, {cm:g} cm per newton"),
         _row([PUSH], "your push"),
         _row(colours, "springs from the fingertips to their footprint (balls)"),
         _row(AXES, "axes of V: x forward, y left, z up"),

@@ -12,10 +12,11 @@ from fingers_mjx.play.viewer.view import Arrows, Poses, Springs, View
 WORLD = "/world"
 NEAR = "/world/near"
 """On the floor under the palm: what browsers draw late is then drawn nearly right."""
-FORCE_M_PER_N = 0.015
+FORCE_M_PER_N = 0.03
 AXIS_M = 0.06
 TILE_M = 0.05
-GHOST_OPACITY = 0.45
+OPACITY, GHOST_OPACITY = 0.5, 0.45
+"""Of the hands: a force goes up through the finger that it acts on, and is seen."""
 
 
 class Scene:
@@ -44,7 +45,7 @@ class Scene:
             plane_color=(232, 236, 240),
             plane_opacity=0.6,
         )
-        self.hand = Bodies(server, f"{WORLD}/hand", model)
+        self.hand = Bodies(server, f"{WORLD}/hand", model, opacity=OPACITY)
         self.ghost: Bodies | None = None
         if with_ghost:
             name = f"{WORLD}/ghost"
@@ -111,9 +112,9 @@ class _ArrowSet:
             name,
             np.zeros((1, 2, 3), np.float32),
             colour,
-            shaft_radius=0.0022,
-            head_radius=0.005,
-            head_length=0.010,
+            shaft_radius=0.003,
+            head_radius=0.008,
+            head_length=0.016,
             visible=False,
         )
 

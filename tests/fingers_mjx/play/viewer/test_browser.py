@@ -41,6 +41,9 @@ def test_a_person_sees_a_hand_that_moves_and_can_stop_it(address):
         shot = tab.picture()
         assert tab.errors == []
     picture = np.asarray(Image.open(io.BytesIO(shot)))
-    middle = picture[250:450, 450:950, :3].astype(int)
+    middle = picture[250:500, 450:950, :3].astype(int)
     colourful = middle.max(axis=2) - middle.min(axis=2) > 80
     assert colourful.sum() > 300, "no finger is to be seen in the middle"
+    red, green, blue = np.moveaxis(middle, 2, 0)
+    force = (red - green > 90) & (green < 60) & (blue > green)
+    assert force.sum() > 150, "no contact force is to be seen"
