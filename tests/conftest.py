@@ -88,6 +88,13 @@ def no_network():
 
 
 @pytest.fixture
+def every_backend(monkeypatch):
+    """A machine on which all physics backends are installed, as a sweep sees it."""
+    place = "fingers_mjx.studies.sweep.check.find_spec"
+    monkeypatch.setattr(place, lambda name: name)
+
+
+@pytest.fixture
 def watch():
     """The watch, with an eye on unsafe loading for the length of a test."""
     WATCH.unsafe.clear()

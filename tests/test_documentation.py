@@ -231,15 +231,13 @@ SWEEPS = [
 ]
 
 
+@pytest.mark.usefixtures("every_backend")
 @pytest.mark.parametrize("text", SWEEPS, ids=range(len(SWEEPS)))
-def test_sweeps_in_the_documents_can_begin(tmp_path, text, monkeypatch):
-    """On a machine that has the backends that they ask for."""
+def test_sweeps_in_the_documents_can_begin(tmp_path, text):
     from envs.config.typed import load_yaml
-    from fingers_mjx.studies.sweep import check
     from fingers_mjx.studies.sweep.resolve import keep_sweep
     from fingers_mjx.studies.sweep.spec import Sweep
 
-    monkeypatch.setattr(check, "find_spec", lambda name: name)
     source = tmp_path / "spec.yaml"
     source.write_text(text, "utf-8")
     (tmp_path / "sweep").mkdir()

@@ -1,5 +1,8 @@
 """The physics backends by name: `jax` and `warp` (MJX), `cpu` (C MuJoCo)."""
 
+import logging
+from collections.abc import Callable
+
 import jax
 import mujoco
 
@@ -11,9 +14,35 @@ from envs.physics.mjx import MjxPhysics
 from envs.physics.quiet_mjx import WARP_INSTALLED
 
 
-def default_backend() -> str:
-    """Returns "warp" where a CUDA device and warp-lang are present, else "cpu"."""
-    return "warp" if WARP_INSTALLED and _has_cuda() else "cpu"
+def default_backend(on_fault: Callable[[str], object] = lambda said: None) -> str:
+    """Returns "warp" where a CUDA device and warp-lang are present, else "cpu".
+
+    Args:
+        on_fault: called with what JAX says where warp-lang is there and no CUDA device.
+    """
+    if not WARP_INSTALLED:
+        return "cpu"
+    said = cuda_fault()
+    if said is None:
+        return "warp"
+    on_fault(said)
+    return "cpu"
+
+
+def cuda_fault() -> str | None:
+    """Returns what JAX says where it has no CUDA device; None where it has one.
+
+    A plugin that does not start is an error where JAX first looks for devices, or an
+    exception that it logs there; later it says less, and takes the CPU.
+    """
+    logged, log = _Exceptions(), logging.getLogger("jax")
+    log.addHandler(logged)
+    try:
+        return None if jax.devices("cuda") else "no device"
+    except RuntimeError as error:
+        return logged.found[0] if logged.found else _sentence(error)
+    finally:
+        log.removeHandler(logged)
 
 
 def make_physics(
@@ -54,8 +83,20 @@ def make_physics(
     raise InputError("physics", "backend", backend, one_of(BACKENDS, backend))
 
 
-def _has_cuda() -> bool:
-    try:
-        return bool(jax.devices("cuda"))
-    except RuntimeError:
-        return False
+class _Exceptions(logging.Handler):
+    """Keeps the exceptions that are logged."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: list[str] = []
+
+    def emit(self, record: logging.LogRecord) -> None:
+        """Takes a record."""
+        error = record.exc_info[1] if record.exc_info else None
+        if error is not None:
+            self.found.append(_sentence(error))
+
+
+def _sentence(error: BaseException) -> str:
+    """Returns what an exception says on one line."""
+    return " ".join(str(error).split()) or type(error).__name__

@@ -47,7 +47,8 @@ prepare_jax()
 import jax
 from envs.config.plugins import found, load
 from envs.errors import InputError
-from envs.physics.backends import default_backend
+from envs.physics.backends import cuda_fault, default_backend
+cuda = cuda_fault()
 broken = []
 for group in ("fingers.tasks", "fingers.drivers", "fingers.logs"):
     for name in found(group):
@@ -57,6 +58,7 @@ for group in ("fingers.tasks", "fingers.drivers", "fingers.logs"):
             broken.append(str(error))
 devices = [f"{d.platform} {d.device_kind}" for d in jax.devices()]
 answer = {"devices": devices, "backend": default_backend(), "broken": broken}
+answer["cuda"] = cuda
 print("\\n" + json.dumps(answer))
 """
 DRAWING = """
@@ -221,7 +223,7 @@ def device_findings(
     on_gpu = any("cpu" not in name.lower() for name in answer["devices"])
     if gpu.sees_gpu() and not on_gpu:
         chosen = gpu.chose_cpu(environment)
-        reason = "the CPU was chosen by a variable" if chosen else gpu.install_command()
+        reason = "the CPU was chosen by a variable" if chosen else _lacking(answer)
         what = "an NVIDIA GPU is visible that JAX does not use"
         yield Finding(NOTE if chosen else WRONG, f"{what} ({reason})")
     elif on_gpu and answer["backend"] != "warp":
@@ -229,6 +231,14 @@ def device_findings(
         yield Finding(WRONG, f"{what} ({gpu.install_command()})")
     for sentence in answer["broken"]:
         yield Finding(WRONG, sentence)
+
+
+def _lacking(answer: dict[str, Any]) -> str:
+    """Returns why JAX does not use a GPU: what to install, or what it says of CUDA."""
+    said = answer.get("cuda")
+    if said is None or not gpu.has_cuda_jax():
+        return gpu.install_command()
+    return f"its CUDA plugin does not start: {said}"
 
 
 def renderer_finding(answer: dict[str, Any] | str) -> Finding:

@@ -6,11 +6,14 @@ import argparse
 import json
 import sys
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.machine.gpu import note_failed_cuda
+from fingers_mjx.cli.machine.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from envs.config.documented import Setting
@@ -38,7 +41,7 @@ def add(commands) -> None:
         "same command goes on after it was stopped or killed. `fingers sweep status "
         "DIR` shows how the members of a sweep stand.",
     )
-    parser.set_defaults(settings=[])
+    parser.set_defaults(settings=[], check=_check, needs_jax=False)
     options.offer_settings(parser, _offered, _preview)
     what = "specification of the sweep; or the word status, and DIR after it"
     options.path(parser, "spec", metavar="SPEC.yaml", help=what)
@@ -71,29 +74,43 @@ def _written(source: Path, assignments: list[str]) -> Sweep:
     return override(load_yaml(Sweep, source), assignments, "arguments")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Runs a sweep, or shows how it stands."""
-    if str(args.spec) == STATUS and args.out is None:
+def _asks(args: argparse.Namespace) -> bool:
+    """Whether the words ask how a sweep stands."""
+    return str(args.spec) == STATUS and args.out is None
+
+
+def _check(args: argparse.Namespace) -> None:
+    """Refuses words that do not fit; a GPU is looked for as the specification says."""
+    if _asks(args):
         if args.directory is None:
             raise InputError("fingers sweep status", "DIR", "", "a sweep directory")
-        return _show(args.directory)
+        args.computes = False
+        return
     if args.directory is not None:
         valid = "one specification, and -o DIR"
         raise InputError("fingers sweep", "DIR", args.directory, valid)
-    if args.out is None:
+    if args.out is None and not args.dry_run:
         raise InputError("fingers sweep", "-o", "", "the directory of the sweep")
+    args.backend = _written(args.spec, args.settings).backend
+
+
+def run(args: argparse.Namespace) -> int:
+    """Runs a sweep, or shows how it stands."""
+    if _asks(args):
+        return _show(args.directory)
     return _run(args.spec, args.settings, args.out)
 
 
 def _run(source: Path, assignments: list[str], out: Path) -> int:
     """Runs a sweep; the report goes to stdout."""
+    prepare_jax()
     import jax
 
     from fingers_mjx.studies.sweep.book import Book
     from fingers_mjx.studies.sweep.display import display
     from fingers_mjx.studies.sweep.engines.by_name import make_engine
     from fingers_mjx.studies.sweep.report import report
-    from fingers_mjx.studies.sweep.resolve import keep_sweep
+    from fingers_mjx.studies.sweep.resolve import keep_sweep, machine_backend
     from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
 
     # This process trains nothing; the memory of a GPU is for those that do.
@@ -101,7 +118,8 @@ def _run(source: Path, assignments: list[str], out: Path) -> int:
     options.check_directory("-o", out)
     written, root = _written(source, assignments), out.absolute()
     with sweep_lock(root):
-        spec = keep_sweep(written, source, root)
+        backend = partial(machine_backend, note_failed_cuda)
+        spec = keep_sweep(written, source, root, backend)
         with display(sys.stdout, root) as show:
             book = Book(spec, root, show.member)
             manifest = run_sweep(book, make_engine(spec, root), show.event)

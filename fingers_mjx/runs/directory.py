@@ -16,6 +16,7 @@ import json
 import os
 import platform
 import subprocess
+import time
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from importlib import metadata
@@ -38,6 +39,8 @@ RUN_FILE = "run.json"
 CONFIG_FILE = "config.yaml"
 VERSIONS_FILE = "versions.json"
 HAND_FILE = "hand.yaml"
+LOCK_WAIT_S = 1.0
+"""Time for which a lock is tried: `is_locked` holds it for an instant [s]."""
 PACKAGES = (
     "fingers-mjx",
     "jax",
@@ -185,13 +188,24 @@ def locked(path: Path, valid: str) -> Iterator[None]:
     """
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        try:
-            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise InputError(path.parent, "", "a run in progress", valid) from None
+        if not _taken(handle):
+            raise InputError(path.parent, "", "a run in progress", valid)
         yield
     finally:
         os.close(handle)
+
+
+def _taken(handle: int) -> bool:
+    """Locks an open file; whether nobody else held it all the time."""
+    last_s = time.monotonic() + LOCK_WAIT_S
+    while True:
+        try:
+            fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() > last_s:
+                return False
+            time.sleep(0.02)
 
 
 def is_locked(path: Path) -> bool:

@@ -14,7 +14,7 @@ from envs.config.typed import dump_yaml, load_yaml, override
 from envs.errors import InputError
 from envs.registry import get_task
 from fingers_deploy.files import read_regular
-from fingers_mjx.ppo.config import TrainConfig, check_config
+from fingers_mjx.ppo.config import TrainConfig, check_config, free_fields
 from fingers_mjx.runs.directory import CONFIG_FILE, RUN_FILE, saved_bound
 
 ENV_PREFIX = "env."
@@ -92,6 +92,12 @@ def run_task(run_dir: Path) -> str:
     if not isinstance(task, str):
         raise InputError(run_dir / RUN_FILE, "bound.train.task", task, "a task")
     return task
+
+
+def free_settings(settings: Settings) -> set[str]:
+    """Returns, by dotted name, the settings that a resumed run may change."""
+    of_task = {f"{ENV_PREFIX}{name}" for name in free_fields(settings.env)}
+    return free_fields(settings.train) | of_task
 
 
 def settings_yaml(settings: Settings) -> str:

@@ -7,12 +7,13 @@ from pathlib import Path
 from typing import Any
 
 from envs.base import VectorEnv
-from fingers_mjx.ppo.config import check_config, free_fields
+from fingers_mjx.ppo.config import check_config
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import check_bound, open_run, record_run
 from fingers_mjx.runs.loggers.base import Open
 from fingers_mjx.runs.loggers.choice import check_installed, chosen
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
+from fingers_mjx.runs.settings import free_settings
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
@@ -191,7 +192,7 @@ def _ended(
     ended: list[Diverged | None] = []
     for member, path, facts in zip(members, paths, shared, strict=True):
         if member.start.resume:
-            free = {f"env.{x}" for x in free_fields(member.setup.env)}
+            free = free_settings(member.setup)
             check_bound(path, facts, free, unset(member.setup))
         if len(members) == 1:
             (path / END_FILE).unlink(missing_ok=True)

@@ -22,6 +22,7 @@ def swept(name):
     return load_yaml(Sweep, CLAIMS / f"{name}.yaml")
 
 
+@pytest.mark.usefixtures("every_backend")
 @pytest.mark.parametrize("name", MEMBERS)
 def test_the_sweeps_can_begin(tmp_path, name):
     made = keep_sweep(swept(name), CLAIMS / f"{name}.yaml", tmp_path)

@@ -10,12 +10,15 @@ from envs.config.typed import from_dict
 from fingers_mjx.cli.main import main
 from fingers_mjx.studies.sweep.book import Book
 from fingers_mjx.studies.sweep.engines.engine import local
+from fingers_mjx.studies.sweep.engines.population import population
 from fingers_mjx.studies.sweep.engines.ray_cluster import LOOPBACK, ray_cluster
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.run import run_sweep, sweep_lock
 from fingers_mjx.studies.sweep.spec import Sweep
 
 WORKER = (sys.executable, str(Path(__file__).with_name("sweep_worker.py")))
+ENGINES = {"local": local, "population": population}
+"""Engines of this machine by name; with `population` a worker has several members."""
 TINY = {
     "num_envs": 8,
     "iterations": 3,
@@ -60,6 +63,11 @@ def run_fake(root, make=local, **changes):
         spec = keep_sweep(sweep(**changes), root / "spec.yaml", root)
         book = Book(spec, root, lambda member: None)
         return run_sweep(book, make(spec, root, WORKER), lambda event: None)
+
+
+def run_fake_on(root, engine, **changes):
+    """As `run_fake`, on one of `ENGINES`."""
+    return run_fake(root, ENGINES[engine], engine=engine, **changes)
 
 
 def run_on_two_nodes(root, source=None):
@@ -108,4 +116,4 @@ if __name__ == "__main__":
     if words[:1] == ["ray"]:
         run_on_two_nodes(Path(root), *map(Path, words[1:]))
     else:
-        run_fake(Path(root))
+        run_fake_on(Path(root), *words)

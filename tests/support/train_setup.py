@@ -11,6 +11,7 @@ import os
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 from support.probe_envs import probe
 
@@ -47,6 +48,24 @@ CONFIG = TrainConfig(
 
 def make_env(num_envs=CONFIG.num_envs):
     return probe("seen_action", num_envs, length=3)
+
+
+def overflowing(room=48, num_envs=CONFIG.num_envs):
+    """A probe that reports dropped contacts as an environment on Warp does."""
+    env = make_env(num_envs)
+
+    def with_metric(state):
+        hit = (state.data["clock"] == 5) & state.data["hit"] & (room < 100)
+        metrics = state.metrics | {"contact_overflow": hit * 1.0}
+        return state.replace(metrics=metrics)
+
+    return SimpleNamespace(
+        num_envs=env.num_envs,
+        action_size=env.action_size,
+        observation_size=env.observation_size,
+        reset=lambda key: with_metric(env.reset(key)),
+        step=lambda state, action: with_metric(env.step(state, action)),
+    )
 
 
 def config(**changes):

@@ -14,7 +14,7 @@ from envs.config.settings.backend import BACKENDS
 from envs.errors import InputError, one_of
 from fingers_deploy.errors import shortened
 from fingers_deploy.files import is_folder
-from fingers_mjx.cli.machine.gpu import install_command
+from fingers_mjx.cli.machine.gpu import install_command, note_failed_cuda
 from fingers_robot.cli.parser import plain_number, plain_whole
 
 if TYPE_CHECKING:
@@ -277,7 +277,7 @@ def backend_of(args: argparse.Namespace) -> str:
         return args.backend or "cpu"
     from envs.physics.backends import default_backend
 
-    return default_backend()
+    return default_backend(note_failed_cuda)
 
 
 def train_config(

@@ -1,13 +1,15 @@
-"""Says when an NVIDIA GPU is there and what would use it is not installed."""
+"""Says when an NVIDIA GPU is there and what would use it is missing or broken."""
 
 import importlib.util
 import logging
 import os
 import shutil
+import sys
 from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 
+from fingers_deploy.errors import shortened
 from fingers_mjx.cli.machine.installation import DISTRIBUTION, source_tree
 
 SIGNS = ("dev/nvidia[0-9]*", "usr/lib/wsl/lib/libcuda.so.1")
@@ -31,8 +33,8 @@ def idle_gpu(
 ) -> str | None:
     """Returns one sentence about a GPU that stays idle, with the command; else None.
 
-    Nothing of CUDA is imported and no device is opened. A CUDA JAX that is installed
-    and does not start is reported by JAX itself.
+    Nothing of CUDA is imported and no device is opened. What is said of a CUDA JAX that
+    is installed and does not start is `failed_cuda`.
 
     Args:
         backend: physics backend that the user asked for, if any.
@@ -48,6 +50,34 @@ def idle_gpu(
     if backend is None and importlib.util.find_spec("warp") is None:
         return f"physics stays on the CPU, Warp is not installed ({install_command()})"
     return None
+
+
+def failed_cuda(
+    said: str,
+    environment: Mapping[str, str] = os.environ,
+    root: Path = Path("/"),
+) -> str | None:
+    """Returns one sentence about a GPU whose CUDA plugin of JAX does not start.
+
+    Args:
+        said: by JAX of CUDA (`envs.physics.backends.cuda_fault`).
+        environment: variables of the process, by which the CPU can be chosen.
+        root: of the file system.
+    """
+    if chose_cpu(environment) or not sees_gpu(root) or not has_cuda_jax():
+        return None
+    what = "an NVIDIA GPU is idle, JAX cannot start its CUDA plugin"
+    return f"{what}: {shortened(said, 200)} (fingers doctor)"
+
+
+def note_failed_cuda(said: str) -> None:
+    """Prints that sentence on stderr where there is one.
+
+    Args:
+        said: as in `failed_cuda`.
+    """
+    if sentence := failed_cuda(said):
+        print(f"fingers: {sentence}", file=sys.stderr)
 
 
 def sees_gpu(root: Path = Path("/")) -> bool:

@@ -11,6 +11,7 @@ from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.together import evaluate_together
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource, load_source
+from fingers_mjx.ppo.config import free_fields
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import CONFIG_FILE
 from fingers_mjx.runs.setup import overridden, training_env
@@ -142,7 +143,7 @@ def _evaluate(
     lost: dict[Key, Exception] = {}
     for key, one in group.items():
         try:
-            sources[key] = _as_evaluated(one.path, settings)
+            sources[key] = _as_evaluated(one, settings)
         except InputError as error:
             lost[key] = error
     tables = _tables(list(sources.values()), next(iter(group.values())), wanted)
@@ -164,10 +165,16 @@ def _evaluate(
     return lost
 
 
-def _as_evaluated(run: Path, settings: Sequence[str]) -> PolicySource:
-    """Returns the policy of a run with the settings of its evaluation."""
-    loaded = load_source(run)
-    setup = overridden(evaluating.as_deployed(loaded.setup), settings)
+def _as_evaluated(one: Training, settings: Sequence[str]) -> PolicySource:
+    """Returns the policy of a run with the settings of its evaluation.
+
+    There is as much room for contacts as the sweep has now: the run may have had less.
+    """
+    loaded, env = load_source(one.path), one.setup.env
+    room = {name: getattr(env, name) for name in free_fields(env)}
+    trained = dataclasses.replace(loaded.setup.env, **room)
+    setup = dataclasses.replace(loaded.setup, env=trained)
+    setup = overridden(evaluating.as_deployed(setup), settings)
     return dataclasses.replace(loaded, setup=setup)
 
 

@@ -1,16 +1,21 @@
 """From a resolved sweep to the trainings of each member."""
 
+from __future__ import annotations
+
 import dataclasses
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from envs.errors import InputError
 from fingers_mjx.ppo.config import preset
-from fingers_mjx.runs.setup import Setup, new_setup, overridden
+from fingers_mjx.runs.settings import overridden
 from fingers_mjx.studies.sweep.search import Overrides
 from fingers_mjx.studies.sweep.spec import Stage, Sweep, seed_list
+
+if TYPE_CHECKING:
+    from fingers_mjx.runs.setup import Setup
 
 RUNS = "runs"
 SETTINGS = "sweep"
@@ -79,6 +84,8 @@ def trainings(spec: Sweep, root: Path, key: Key) -> list[Training]:
 
 def _setup(spec: Sweep, root: Path, key: Key, stage: Stage) -> Setup:
     """Returns the settings of one stage; a configuration's count before a stage's."""
+    from fingers_mjx.runs.setup import new_setup
+
     own = dict(spec.configurations[key.configuration])
     hand = own.pop("hand", spec.hand)
     train = preset(spec.preset or "", spec.task)

@@ -11,6 +11,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,9 @@ from envs.errors import InputError
 from envs.hand.hand_file import hand_yaml, load_hand_file
 from fingers_deploy import load_bundle
 from fingers_deploy.errors import shortened
+from fingers_mjx.ppo.config import TrainConfig
 from fingers_mjx.runs.directory import flat
+from fingers_mjx.runs.settings import free_settings, new_settings
 from fingers_mjx.studies.sweep.check import check_sweep, check_words
 from fingers_mjx.studies.sweep.promote import check_promotion, measure
 from fingers_mjx.studies.sweep.search import Overrides, gridded, sampled
@@ -31,6 +34,15 @@ LOCK_FILE = "sweep.lock"
 BASE = "base"
 """Name of the configuration of a sweep that names none."""
 ADDABLE = ("configurations", "seeds")
+LENGTH = "iterations"
+"""A resumed run may change it; in a sweep, members that are done have the old one."""
+_ASK = """
+import json
+from envs.physics.backends import default_backend
+said = []
+backend = default_backend(said.append)
+print("\\n" + json.dumps([backend, said]))
+"""
 
 
 def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, bytes]]:
@@ -104,18 +116,23 @@ def resolved(spec: Sweep, source: Path, backend: str) -> tuple[Sweep, dict[str, 
     return made, files
 
 
-def machine_backend() -> str:
+def machine_backend(on_fault: Callable[[str], None] = lambda said: None) -> str:
     """Returns the backend that `fingers train` takes by itself on this machine.
 
     Asked of a process of its own: one that has looked for a GPU keeps part of it.
+
+    Args:
+        on_fault: called with what JAX says where Warp is there and no CUDA device.
     """
-    program = "from envs.physics.backends import default_backend as d; print(d())"
-    command = [sys.executable, "-c", program]
+    command = [sys.executable, "-c", _ASK]
     environment = {**os.environ, "TF_CPP_MIN_LOG_LEVEL": "3"}
     done = subprocess.run(
         command, env=environment, capture_output=True, text=True, check=True
     )
-    return done.stdout.split()[-1]
+    backend, faults = json.loads(done.stdout.splitlines()[-1])
+    for said in faults:
+        on_fault(said)
+    return backend
 
 
 def saved_sweep(directory: Path) -> Sweep | None:
@@ -124,13 +141,19 @@ def saved_sweep(directory: Path) -> Sweep | None:
     return load_yaml(Sweep, path) if path.exists() else None
 
 
-def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
+def keep_sweep(
+    written: Sweep,
+    source: Path,
+    root: Path,
+    default_backend: Callable[[], str] = machine_backend,
+) -> Sweep:
     """Resolves a sweep, checks it, and writes it and its files to its directory.
 
     Args:
         written: as read from `source`.
         source: file of the specification.
         root: directory of the sweep.
+        default_backend: returns the backend of a sweep that names none.
 
     Raises:
         InputError: a setting that cannot work, or that is not that of the sweep in the
@@ -138,7 +161,7 @@ def keep_sweep(written: Sweep, source: Path, root: Path) -> Sweep:
     """
     saved = saved_sweep(root)
     backend = written.backend or (saved.backend if saved else None)
-    backend = backend or machine_backend()
+    backend = backend or default_backend()
     check_words(written, source, backend)
     spec, files = resolved(written, source, backend)
     if saved is None:
@@ -165,11 +188,14 @@ def _check_empty(root: Path) -> None:
 def check_only_added(saved: Sweep, spec: Sweep, source: Path) -> None:
     """Refuses a sweep that is not the saved one with more seeds or configurations.
 
-    How members are trained (engine, processes) may change too, as does not change them.
+    How members are trained (engine, processes) may change too, as does not change them;
+    so may the settings that a resumed run may change, but for `LENGTH`.
 
     Raises:
         InputError: naming the first field that differs.
     """
+    free = free_settings(new_settings(TrainConfig(task=spec.task))) - {LENGTH}
+    saved, spec = _without(saved, free), _without(spec, free)
     for name in ADDABLE:
         was, found = _addable(saved, name), _addable(spec, name)
         for key, value in was.items():
@@ -185,6 +211,21 @@ def check_only_added(saved: Sweep, spec: Sweep, source: Path) -> None:
         if was.get(key) != found.get(key):
             now, before = found.get(key, "nothing"), was.get(key, "nothing")
             raise _changed(source, key, now, before)
+
+
+def _without(spec: Sweep, names: set[str]) -> Sweep:
+    """Returns a sweep that leaves some settings to their defaults."""
+
+    def rest(settings: Overrides) -> Overrides:
+        return {name: value for name, value in settings.items() if name not in names}
+
+    stages = [dataclasses.replace(stage, set=rest(stage.set)) for stage in spec.stages]
+    return dataclasses.replace(
+        spec,
+        set=rest(spec.set),
+        stages=tuple(stages),
+        configurations={name: rest(own) for name, own in spec.configurations.items()},
+    )
 
 
 def _configurations(spec: Sweep, source: Path) -> dict[str, Overrides]:

@@ -4,8 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.physics import PhysicsOutput, PhysicsState
-from envs.physics.base import nan_if_diverged
+from envs.physics.base import PhysicsOutput, PhysicsState, nan_if_diverged
 
 
 def sensor(mj_model, output, name):

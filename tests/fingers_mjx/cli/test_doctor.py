@@ -112,6 +112,18 @@ def test_devices(answer, sees, environment, said, monkeypatch):
 
 
 @pytest.mark.parametrize(
+    ("plugin", "reason"),
+    [(True, "its CUDA plugin does not start: no driver"), (False, "make cuda12")],
+)
+def test_a_cuda_that_is_installed_and_does_not_start(monkeypatch, plugin, reason):
+    monkeypatch.setattr(gpu, "sees_gpu", lambda: True)
+    monkeypatch.setattr(gpu, "has_cuda_jax", lambda: plugin)
+    answer = HEALTHY | {"cuda": "no driver"}
+    (sentence,) = wrong(doctor.device_findings(answer, {}))
+    assert reason in sentence
+
+
+@pytest.mark.parametrize(
     ("environment", "said"),
     [
         ({}, []),

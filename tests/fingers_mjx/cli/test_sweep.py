@@ -7,7 +7,9 @@ from support import sweep_setup
 from support.sweep_setup import WORKER, plan_faults, run_fake, written
 
 from envs.config.strict_yaml import write_yaml
+from fingers_mjx.cli.machine import gpu
 from fingers_mjx.cli.main import main
+from fingers_mjx.studies.sweep import resolve
 from fingers_mjx.studies.sweep.engines import by_name
 from fingers_mjx.studies.sweep.engines.engine import local
 
@@ -40,6 +42,50 @@ def test_words_that_do_not_fit_are_refused_in_one_sentence(
     error = capsys.readouterr().err
     assert said in error and error.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture
+def idle(monkeypatch):
+    """A GPU that stays idle unless the backend is cpu, as `idle_gpu` says."""
+    say = lambda backend: None if backend == "cpu" else f"idle: {backend}"  # noqa: E731
+    monkeypatch.setattr("fingers_mjx.cli.main.idle_gpu", say)
+
+
+@pytest.mark.usefixtures("idle")
+@pytest.mark.parametrize(
+    ("backend", "said"),
+    [("cpu", ""), ("jax", "fingers: idle: jax\n"), (None, "fingers: idle: None\n")],
+)
+def test_a_gpu_that_the_specification_declines_is_left_alone(
+    source, backend, said, capsys
+):
+    source.write_text(write_yaml(written(backend=backend)), "utf-8")
+    assert main(["sweep", str(source), "--dry-run"]) == 0
+    assert capsys.readouterr().err == said
+    assert main(["sweep", str(source), "--dry-run", "--backend", "cpu"]) == 0
+    assert capsys.readouterr().err == ""
+
+
+@pytest.mark.usefixtures("idle")
+def test_to_ask_how_a_sweep_stands_no_gpu_is_looked_for(tmp_path, capsys):
+    assert main(["sweep", "status", str(tmp_path)]) == 2
+    assert "idle" not in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("backend", "times"), [(None, 1), ("cpu", 0)])
+def test_a_cuda_that_does_not_start_is_named_once(
+    source, tmp_path, monkeypatch, capsys, backend, times
+):
+    def machine_backend(on_fault):
+        on_fault("no driver")
+        return "cpu"
+
+    sentence = "JAX cannot start CUDA: no driver"
+    monkeypatch.setattr(resolve, "machine_backend", machine_backend)
+    monkeypatch.setattr(gpu, "failed_cuda", lambda said: sentence)
+    source.write_text(write_yaml(written(backend=backend)), "utf-8")
+    assert main(["sweep", str(source), "-o", str(tmp_path / "sweep")]) == 0
+    assert capsys.readouterr().err.count(f"fingers: {sentence}\n") == times
 
 
 def test_a_sweep_ends_in_a_report(source, tmp_path, capsys):

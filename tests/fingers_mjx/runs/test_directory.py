@@ -1,8 +1,12 @@
 """Run directory: one writer, never over something else, curves without a seam."""
 
+import fcntl
 import json
 import os
 import struct
+import threading
+import time
+from contextlib import contextmanager
 from dataclasses import dataclass
 
 import pytest
@@ -12,7 +16,14 @@ from envs.config.atomic_file import PARTIAL
 from envs.config.typed import load_yaml
 from envs.errors import InputError
 from fingers_mjx.ppo.config import TrainConfig
-from fingers_mjx.runs.directory import check_bound, open_run, record_run
+from fingers_mjx.runs import directory
+from fingers_mjx.runs.directory import (
+    check_bound,
+    is_locked,
+    locked,
+    open_run,
+    record_run,
+)
 from fingers_mjx.runs.files import OutOfSpace, write_whole
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
 
@@ -111,6 +122,35 @@ def test_one_writer_at_a_time(tmp_path):
         second.__enter__()
     with open_run(path, resume=True):
         pass
+
+
+@contextmanager
+def looked_at(path, seconds):
+    """Holds a lock file as `is_locked` does, but for as long as is said."""
+    handle = os.open(path, os.O_RDWR | os.O_CREAT)
+    fcntl.flock(handle, fcntl.LOCK_SH)
+    look = threading.Timer(seconds, os.close, [handle])
+    look.start()
+    yield
+    look.join()
+
+
+def test_a_look_at_a_lock_does_not_keep_others_from_it(tmp_path):
+    path = tmp_path / "x.lock"
+    with looked_at(path, 0.2), locked(path, "a lock"):
+        assert is_locked(path)
+    assert not is_locked(path)
+
+
+def test_a_lock_that_stays_held_is_refused_soon(tmp_path, monkeypatch):
+    """Negative control; the time is that of a look, many times over."""
+    monkeypatch.setattr(directory, "LOCK_WAIT_S", 0.1)
+    path, begun_s = tmp_path / "x.lock", time.monotonic()
+    with locked(path, ""), pytest.raises(InputError, match="valid: a lock"):
+        locked(path, "a lock").__enter__()
+    assert time.monotonic() - begun_s < 5.0
+    with looked_at(path, 0.5), pytest.raises(InputError, match="in progress"):
+        locked(path, "a lock").__enter__()
 
 
 @pytest.mark.parametrize(

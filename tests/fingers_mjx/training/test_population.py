@@ -8,14 +8,15 @@ import dataclasses
 import pytest
 from support import train_setup
 from support.probe_envs import Fault, probe
-from support.train_setup import assert_same_end, curve, leaves, setup
+from support.train_setup import assert_same_end, curve, leaves, overflowing, setup
 
 from envs.errors import InputError
+from envs.task import HandSettings
 from fingers_mjx.runs.metrics import read_metrics
 from fingers_mjx.training.errors import Diverged, Interrupted
 from fingers_mjx.training.member import END_FILE
 from fingers_mjx.training.population import Member, check_population
-from fingers_mjx.training.train import Start, train, train_population
+from fingers_mjx.training.train import FRESH, Start, train, train_population
 
 WORLDS = 16
 OWN = (
@@ -214,6 +215,37 @@ def test_population_ends_when_all_have_diverged(tmp_path):
     assert all(result.diverged for result in results)
     assert [result.iterations for result in results] == [2, 2]
     assert (tmp_path / "0" / END_FILE).is_file()
+
+
+def in_room(path, room, start=FRESH, **changes):
+    """Returns two members with some room for contacts."""
+    config = train_setup.config(checkpoint_every=1, **changes)
+    return [
+        Member(
+            setup(dataclasses.replace(config, seed=seed), HandSettings(**room)),
+            path / str(seed),
+            start,
+        )
+        for seed in (0, 1)
+    ]
+
+
+def test_dropped_contacts_end_the_program_and_with_more_room_all_go_on(tmp_path):
+    """One member's world has too many; the room for them is that of all."""
+    worlds, resume = 2 * WORLDS, Start(resume=True)
+    with pytest.raises(InputError, match="dropped in 1 of 16 worlds") as error:
+        train_population(
+            overflowing(48, worlds), in_room(tmp_path, {"contacts_per_world": 48})
+        )
+    assert error.value.field == "env.contacts_per_world"
+    assert [leaves(tmp_path / name)[0] for name in "01"] == [1, 1]
+    wider = {"contacts_per_world": 192}
+    other = in_room(tmp_path, wider | {"action_clip": 1.0}, resume)
+    with pytest.raises(InputError, match=r"env\.action_clip: found 1\.0"):
+        train_population(overflowing(192, worlds), other)
+    members = in_room(tmp_path, wider, resume, on_overflow="warn", log_every=5)
+    results = train_population(overflowing(192, worlds), members)
+    assert [result.iterations for result in results] == [10, 10]
 
 
 @pytest.mark.parametrize(

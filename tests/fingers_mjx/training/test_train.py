@@ -8,7 +8,6 @@ nothing grows), T12 (same seed, same run).
 import dataclasses
 import resource
 from pathlib import Path
-from types import SimpleNamespace
 
 import jax
 import numpy as np
@@ -16,7 +15,15 @@ import pytest
 from support import train_setup
 from support.checkpoint_child import watched_steps
 from support.probe_envs import Fault, probe
-from support.train_setup import assert_same_end, curve, leaves, make_env, run, setup
+from support.train_setup import (
+    assert_same_end,
+    curve,
+    leaves,
+    make_env,
+    overflowing,
+    run,
+    setup,
+)
 
 from envs.errors import InputError
 from envs.task import HandSettings
@@ -241,24 +248,6 @@ def test_full_disk_of_the_curve_stops_within_one_row(tmp_path):
     assert leaves(path)[0] == 4
     assert run(path, resume=True, checkpoint_every=4).iterations == 10
     assert [row[0] for row in curve(path)] == list(range(1, 11))
-
-
-def overflowing(room=48):
-    """A probe that reports dropped contacts as an environment on Warp does."""
-    env = make_env()
-
-    def with_metric(state):
-        hit = (state.data["clock"] == 5) & state.data["hit"] & (room < 100)
-        metrics = state.metrics | {"contact_overflow": hit * 1.0}
-        return state.replace(metrics=metrics)
-
-    return SimpleNamespace(
-        num_envs=env.num_envs,
-        action_size=env.action_size,
-        observation_size=env.observation_size,
-        reset=lambda key: with_metric(env.reset(key)),
-        step=lambda state, action: with_metric(env.step(state, action)),
-    )
 
 
 def test_dropped_contacts_stop_the_run(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from fingers_mjx.cli import main
 from fingers_mjx.cli.machine import gpu
-from fingers_mjx.cli.machine.gpu import chose_cpu, idle_gpu, sees_gpu
+from fingers_mjx.cli.machine.gpu import chose_cpu, failed_cuda, idle_gpu, sees_gpu
 from fingers_mjx.cli.play import CRAWL_POLICY
 
 NATIVE, WSL = "dev/nvidia3", "usr/lib/wsl/lib/libcuda.so.1"
@@ -75,6 +75,23 @@ def test_nothing_is_said_without_a_gpu(monkeypatch, tmp_path, files):
     install(monkeypatch, cuda=False, warp=False)
     assert not sees_gpu(with_files(tmp_path, *files))
     assert idle_gpu(None, {}, tmp_path) is None
+
+
+def test_a_cuda_that_does_not_start_is_named_with_what_jax_says(monkeypatch, machine):
+    install(monkeypatch, cuda=True, warp=True)
+    assert failed_cuda("no driver\nat all", {}, machine) == (
+        "an NVIDIA GPU is idle, JAX cannot start its CUDA plugin: no driver at all "
+        "(fingers doctor)"
+    )
+
+
+def test_nothing_is_said_of_a_cuda_that_cannot_be_meant(monkeypatch, machine, tmp_path):
+    """Declined, without a GPU, or not installed, of which `idle_gpu` speaks."""
+    install(monkeypatch, cuda=True, warp=True)
+    assert failed_cuda("no driver", {"JAX_PLATFORMS": "cpu"}, machine) is None
+    assert failed_cuda("no driver", {}, tmp_path / "elsewhere") is None
+    install(monkeypatch, cuda=False, warp=True)
+    assert failed_cuda("no driver", {}, machine) is None
 
 
 CPU = [

@@ -1,11 +1,12 @@
 """From what the user writes to what the directory keeps."""
 
 import dataclasses
+import json
 import shutil
 from pathlib import Path
 
 import pytest
-from support.sweep_setup import sweep
+from support.sweep_setup import TINY, sweep
 
 import fingers_mjx
 from envs.config.typed import load_yaml
@@ -13,11 +14,13 @@ from envs.errors import InputError
 from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
 from fingers_deploy import load_bundle
 from fingers_mjx.policy.place import is_bundle
+from fingers_mjx.studies.sweep import resolve
 from fingers_mjx.studies.sweep.plan import Key, keys, trainings
 from fingers_mjx.studies.sweep.resolve import (
     SPEC_FILE,
     check_only_added,
     keep_sweep,
+    machine_backend,
     resolved,
     saved_sweep,
 )
@@ -116,6 +119,76 @@ def test_anything_else_that_changes_is_refused_by_name(source, change, field):
     with pytest.raises(InputError, match="as the sweep was begun") as error:
         check_only_added(before, after, source)
     assert error.value.field == field
+
+
+BEGUN = {
+    "set": TINY | {"env.contacts_per_world": 48, "log_every": 1},
+    "stages": [{"name": "walk", "set": {"hang_limit_s": 60.0}}],
+    "configurations": {"plain": {"keep_checkpoints": 2}, "lift": {}},
+}
+FREED = [
+    {"set": TINY | {"env.contacts_per_world": 96, "log_every": 3}},
+    {"set": TINY | {"env.constraints_per_world": 256, "on_overflow": "warn"}},
+    {"set": TINY},
+    {"stages": [{"name": "walk", "set": {"on_overflow": "warn"}}]},
+    {"stages": [{"name": "walk"}]},
+    {"configurations": {"plain": {"env.contacts_per_world": 96}, "lift": {}}},
+]
+BOUND = [
+    ({"set": TINY | {"iterations": 6}}, "set.iterations"),
+    ({"set": TINY | {"env.contacts_per_world": 96, "ppo.clip": 0.1}}, "set.ppo.clip"),
+    ({"set": TINY | {"env.action_clip": 1.0}}, "set.env.action_clip"),
+    ({"stages": [{"name": "walk", "set": {"iterations": 6}}]}, "stages"),
+    ({"stages": [{"name": "walk", "set": {"ppo.clip": 0.1}}]}, "stages"),
+    (
+        {"configurations": {"plain": {"iterations": 6}, "lift": {}}},
+        "configurations.plain",
+    ),
+    (
+        {"configurations": {"plain": {"log_every": 3, "num_envs": 4}, "lift": {}}},
+        "configurations.plain",
+    ),
+]
+
+
+@pytest.mark.parametrize("change", FREED, ids=str)
+def test_what_a_resumed_run_may_change_a_sweep_may(tmp_path, source, change):
+    """Changed, added or gone: what Warp had too little room for can be given more."""
+    root = tmp_path / "sweep"
+    before = kept(root, source, **BEGUN)
+    after = kept(root, source, **BEGUN | change)
+    assert after != before and saved_sweep(root) == after
+    assert keys(after) == keys(before)
+
+
+@pytest.mark.parametrize(("change", "field"), BOUND, ids=str)
+def test_what_changes_a_member_a_sweep_may_not(tmp_path, source, change, field):
+    """Negative control; the number of iterations is what members are trained for."""
+    before = kept(tmp_path / "sweep", source, **BEGUN)
+    with pytest.raises(InputError, match="as the sweep was begun") as error:
+        kept(tmp_path / "sweep", source, **BEGUN | change)
+    assert error.value.field == field
+    assert saved_sweep(tmp_path / "sweep") == before
+
+
+def test_a_machine_is_asked_only_where_no_backend_is_named(tmp_path, source):
+    asked = []
+    ask = lambda: asked.append("cpu") or "cpu"  # noqa: E731
+    (tmp_path / "sweep").mkdir()
+    for spec in (sweep(), sweep(backend=None), sweep(backend=None)):
+        assert keep_sweep(spec, source, tmp_path / "sweep", ask).backend == "cpu"
+    assert asked == []  # the sweep was begun with one
+    (tmp_path / "other").mkdir()
+    keep_sweep(sweep(backend=None), source, tmp_path / "other", ask)
+    assert asked == ["cpu"]
+
+
+@pytest.mark.parametrize("said", [[], ["no driver"]])
+def test_what_jax_says_of_cuda_comes_back_with_the_backend(monkeypatch, said):
+    program = f"print('Warp 1.0'); print({json.dumps(json.dumps(['cpu', said]))})"
+    monkeypatch.setattr(resolve, "_ASK", program)
+    faults = []
+    assert (machine_backend(faults.append), faults) == ("cpu", said)
 
 
 @pytest.mark.parametrize(

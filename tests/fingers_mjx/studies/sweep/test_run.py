@@ -12,9 +12,11 @@ from pathlib import Path
 import pytest
 from support import sweep_setup
 from support.sweep_setup import (
+    ENGINES,
     journal,
     plan_faults,
     run_fake,
+    run_fake_on,
     states,
     summaries,
     sweep,
@@ -139,9 +141,9 @@ def test_promotion_waits_for_what_is_missing(tmp_path):
     assert len(manifest.members) == 4
 
 
-def start(root):
+def start(root, engine="local"):
     """Starts a sweep in a process of its own."""
-    words = [sys.executable, str(Path(sweep_setup.__file__)), str(root)]
+    words = [sys.executable, str(Path(sweep_setup.__file__)), str(root), engine]
     here = Path(__file__).parents[4]
     path = os.pathsep.join(map(str, (here, here / "tests", here / "deploy")))
     environment = {**os.environ, "PYTHONPATH": path}
@@ -167,8 +169,13 @@ def alone(root):
 
 
 def workers(root):
-    pids = [line.split()[2] for line in (root / "journal.txt").open("r")]
-    return [p for p in pids if str(root).encode() in command(p)]
+    return [p for p in workers_begun(root) if str(root).encode() in command(p)]
+
+
+def workers_begun(root):
+    """Returns the process of every line of the journal that says that one began."""
+    lines = (root / "journal.txt").read_text("utf-8").splitlines()
+    return [line.split()[2] for line in lines if line.startswith("begin ")]
 
 
 def command(pid):
@@ -191,10 +198,10 @@ def test_a_signal_stops_workers_and_the_next_start_goes_on(tmp_path):
     assert set(states(run_fake(tmp_path)).values()) == {"done"}
 
 
-def killed_often(root, kills, rng):
+def killed_often(root, kills, rng, engine):
     """Kills the parent of a sweep so often, each time a little later in its life."""
     for _ in range(kills):
-        parent = start(root)
+        parent = start(root, engine)
         begun(root, len([x for x in journal(root) if x[0] == "begin"]) + 1)
         time.sleep(rng.uniform(0.0, 0.3))
         parent.kill()
@@ -202,30 +209,34 @@ def killed_often(root, kills, rng):
         alone(root)
 
 
-def check_kills(root, kills, seed, **changes):
+def check_kills(root, kills, seed, engine):
     """T14: nothing that had finished is repeated, nothing skipped, no two writers."""
     print(f"seed {seed}")
     members = [f"{c}/{s}" for s in range(2) for c in ("plain", "lift")]
     # Each member is at work for long in its first attempts, so that kills hit it.
     faults = {member: ["slow"] * kills for member in members}
     plan_faults(root, faults)
-    killed_often(root, kills, random.Random(seed))
+    killed_often(root, kills, random.Random(seed), engine)
+    together = max(Counter(workers_begun(root)).values())
+    assert together == {"local": 1, "population": 2}[engine]
     plan_faults(root, {})
-    manifest = run_fake(root, **changes)
+    manifest = run_fake_on(root, engine)
     assert set(states(manifest).values()) == {"done"}
     ended = Counter(member for word, member in journal(root) if word == "end")
     assert ended == dict.fromkeys(members, 1)
     assert all(is_evaluated(root / m.run) for m in manifest.members)
 
 
-def test_a_killed_parent_leaves_no_worker_and_the_next_finishes(tmp_path):
-    check_kills(tmp_path, kills=1, seed=0)
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_killed_parent_leaves_no_worker_and_the_next_finishes(tmp_path, engine):
+    check_kills(tmp_path, kills=1, seed=0, engine=engine)
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("seed", [1])
-def test_twenty_kills_of_the_parent(tmp_path, seed):
-    check_kills(tmp_path, kills=20, seed=seed)
+def test_twenty_kills_of_the_parent(tmp_path, seed, engine):
+    check_kills(tmp_path, kills=20, seed=seed, engine=engine)
 
 
 def test_the_lock_of_a_parent_ends_with_it(tmp_path):

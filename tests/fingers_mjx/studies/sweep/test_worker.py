@@ -65,6 +65,17 @@ def test_an_error_becomes_status_and_reason(root, error, status, said, words):
     assert found.verdict == said and words in found.reason
 
 
+def test_what_ends_a_program_is_the_reason_of_all_its_members(root):
+    """As when Warp's room for contacts, which they share, was too small."""
+    source = "iteration 2: contacts dropped in 1 of 8 worlds"
+    error = InputError(source, "env.contacts_per_world", 48, "about 96")
+    status = run(root, error, keys=(ONE, TWO))
+    for key in (ONE, TWO):
+        found = verdict(root, key, status)
+        assert found.verdict == "failed"
+        assert "env.contacts_per_world: found 48; valid: about 96" in found.reason
+
+
 def test_members_are_trained_and_evaluated(root, capsys):
     evaluated = []
     assert run(root, keys=(ONE, TWO), evaluated=evaluated) == 0

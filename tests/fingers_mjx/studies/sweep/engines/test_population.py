@@ -1,10 +1,16 @@
 """The engine `population`: who shares a program, and how many."""
 
-from support.sweep_setup import plan_faults, run_fake, states, sweep
+import dataclasses
+from types import SimpleNamespace
 
+from support.sweep_setup import TINY, plan_faults, run_fake, states, sweep
+from support.sweep_worker import finish
+
+from envs.errors import InputError
+from fingers_mjx.studies.sweep import worker
 from fingers_mjx.studies.sweep.engines import population as engine
 from fingers_mjx.studies.sweep.engines.population import machine_worlds, population
-from fingers_mjx.studies.sweep.plan import Key, keys
+from fingers_mjx.studies.sweep.plan import Key, keys, trainings
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 
 CONFIGURATIONS = {
@@ -84,6 +90,49 @@ def test_faults_in_one_program_are_each_members_own(tmp_path):
     }
     log = (tmp_path / "runs/lift/1/log.txt").read_text("utf-8")
     assert log.splitlines()[0] == "in one program with plain/0, whose log has the lines"
+
+
+ROOM = "env.contacts_per_world"
+
+
+def train_in_room(spec, root, keys, on_progress):
+    """Pretends to train as one program on Warp: seed 1 has many contacts."""
+    room = trainings(spec, root, keys[0])[0].setup.env.contacts_per_world
+    if room < 96 and any(key.seed == 1 for key in keys):
+        what = "iteration 2: contacts dropped in 1 of 32 worlds"
+        raise InputError(what, ROOM, room, f"about {2 * room}")
+    return {}
+
+
+def evaluated(spec, root, keys):
+    for key in keys:
+        run = trainings(spec, root, key)[-1].path
+        (run / "eval").mkdir(parents=True, exist_ok=True)
+        finish(run, *key)
+    return {}
+
+
+def in_this_process(spec, root, command):
+    """The engine `population` with workers that are done when they are started."""
+
+    def launch(keys):
+        words = [str(root), *(word for key in keys for word in map(str, key))]
+        status = worker.main(words, train_in_room, evaluated)
+        return SimpleNamespace(poll=lambda: status, stop=lambda: None)
+
+    return dataclasses.replace(population(spec, root, command), launch=launch)
+
+
+def test_all_of_a_program_without_room_fail_and_go_on_with_more(tmp_path):
+    """All say which setting; with it changed the same sweep is finished."""
+    how = {"engine": "population", "processes": 1}
+    manifest = run_fake(tmp_path, in_this_process, **how)
+    assert set(states(manifest).values()) == {"failed"} and len(manifest.members) == 4
+    assert all(f"{ROOM}: found 48" in m.reason for m in manifest.members)
+    assert [m.attempts for m in manifest.members] == [1] * 4
+    manifest = run_fake(tmp_path, in_this_process, **how, set=TINY | {ROOM: 96})
+    assert set(states(manifest).values()) == {"done"}
+    assert [m.attempts for m in manifest.members] == [2] * 4
 
 
 def test_the_memory_of_a_gpu_bounds_its_worlds(monkeypatch):
