@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.motion import JointTrack
@@ -14,7 +14,15 @@ FOLDS = 3
 """Number of folds of one record, and of several."""
 
 BLOCK_S = 1.0
-"""Length of the blocks that are dealt out to folds [s]."""
+"""Length of the blocks that are dealt out to folds, while errors are in many [s]."""
+
+SHORTEST_S = 0.1
+"""Least length of those blocks [s]."""
+
+MOST_IN_FOLD = 0.8
+"""Share of the squared error that one fold may hold. A limit that one move alone meets
+is not known without that move, and what is predicted of it then is wrong however true
+the limit is; of parts of the move each is predicted from the others."""
 
 
 def folds_of(
@@ -49,5 +57,50 @@ def folds_of(
     records = sorted(set(data.log.tolist()))
     if len(records) > 1:
         return np.tile([records.index(i) % FOLDS for i in data.log], (m, 1))
+    return _in_time(data, repeats, BLOCK_S)
+
+
+def shorter_blocks(
+    data: JointTrack,
+    repeats: Repeats,
+    fold: Int[np.ndarray, "m p"],
+    error: Float[np.ndarray, "m p"],
+) -> tuple[Int[np.ndarray, "m p"], float]:
+    """Shortens blocks of time until no fold holds nearly all of an error.
+
+    A second, halved while one fold holds more than `MOST_IN_FOLD` of Σ e². Folds by
+    setting, load or record stay.
+
+    Args:
+        data: the joint's track.
+        repeats: of the motion.
+        fold: of `folds_of`.
+        error: e, of the nominal simulation.
+
+    Returns:
+        Folds [1] and the length of their blocks, at least `SHORTEST_S` [s].
+
+    Source:
+        Ours.
+    """
+    length, shorter = BLOCK_S, _in_time(data, repeats, BLOCK_S)
+    if not np.array_equal(fold, shorter):
+        return fold, length
+    while length > 2.0 * SHORTEST_S and _largest_share(shorter, error) > MOST_IN_FOLD:
+        length *= 0.5
+        shorter = _in_time(data, repeats, length)
+    return shorter, length
+
+
+def _largest_share(fold: np.ndarray, error: np.ndarray) -> float:
+    """Returns the share of the squared error in the fold that has most of it."""
+    power = np.bincount(fold.ravel(), (error**2).ravel(), FOLDS)
+    return float(power.max() / max(power.sum(), 1e-300))
+
+
+def _in_time(
+    data: JointTrack, repeats: Repeats, length: float
+) -> Int[np.ndarray, "m p"]:
+    """Deals out blocks of time in turn."""
     seconds = EVERY * data.dt * repeats.root + data.start_s[repeats.root_piece]
-    return (seconds // BLOCK_S).astype(int) % FOLDS
+    return (seconds // length).astype(int) % FOLDS

@@ -7,7 +7,7 @@ So the simulation is fitted to the angle with and without the effect (`closed_lo
 each time without the stretch that is predicted, and without the effect within the
 tolerances of its parameters: an error that a parameter out of its tolerance would hide
 is there. With their angle
-errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over blocks of a second,
+errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over its blocks,
 
     t = d̄ √B / s_d
 
@@ -42,9 +42,6 @@ from sysid.diagnosis.search.space import SIGMA
 
 LEVEL = 1.0
 """Least t of a difference that counts."""
-
-BLOCK_S = 1.0
-"""Length of a block [s]."""
 
 LEFT = 2.0
 """Mean squared error that may remain, in units of its noise: of the angle it is at most
@@ -181,7 +178,7 @@ class Judge:
             Business & Economic Statistics 13(3), 1995.
         """
         before, after = (np.minimum(self.error(m) ** 2, 1e12) for m in (worse, better))
-        size = max(1, round(BLOCK_S / (EVERY * self.problem.data.dt)))
+        size = max(1, round(self.problem.block_s / (EVERY * self.problem.data.dt)))
         gained = np.where(self.valid, before - after, 0.0)
         edges = np.arange(0, len(gained), size)
         sums = np.add.reduceat(gained, edges).ravel()

@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
-from sysid.diagnosis.search.folds import folds_of
+from sysid.diagnosis.search.folds import BLOCK_S, folds_of
 from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
@@ -50,6 +50,7 @@ class Problem:
         repeat: where the motion was made before.
         weight: less than one where sampling may hide fast changes.
         known: which part of the joint can be examined; see `JointDrive`.
+        block_s: length of stretches that are held out [s].
     """
 
     channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
@@ -62,6 +63,7 @@ class Problem:
     repeat: Repeats
     weight: Float[np.ndarray, "2 m p"]
     known: str = "both"
+    block_s: float = BLOCK_S
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True

@@ -6,7 +6,7 @@ the penalty of the priors of the nuisance parameters (`candidate`), so that a pa
 far off its prior is a finding and not silently absorbed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from sysid.diagnosis.search.candidate import (
     log_likelihood_gain,
 )
 from sysid.diagnosis.search.coupling import coupled
+from sysid.diagnosis.search.folds import shorter_blocks
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.output_error import output_problem
 from sysid.diagnosis.search.output_starts import settled_output
@@ -99,6 +100,7 @@ def search(problem: Problem) -> Search:
     output = output_problem(problem)
     if output is not None:
         problem, base = settled_output(output, base)
+    problem, base = in_parts(problem, base)
     found = _searched(problem, base)
     strained = base.penalty > STRAINED
     if problem.repeat or not (found.best.effects or strained):
@@ -106,6 +108,16 @@ def search(problem: Problem) -> Search:
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
     return _searched(problem, base)
+
+
+def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
+    """Holds out parts of a moment that alone has nearly all of the nominal error."""
+    error = np.hypot(*base.fit.residual.reshape(2, *problem.fold.shape))
+    fold, block_s = shorter_blocks(problem.data, problem.repeat, problem.fold, error)
+    if block_s == problem.block_s:
+        return problem, base
+    problem = replace(problem, fold=fold, block_s=block_s)
+    return problem, fit_models(problem, [()], [base.fit.theta])[0]
 
 
 def _searched(problem: Problem, base: Model) -> Search:

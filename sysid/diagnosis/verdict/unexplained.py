@@ -74,8 +74,9 @@ def _left(found: Search) -> _Left:
     """
     problem, base, best, judge = found.problem, found.base, found.best, found.judge
     if isinstance(problem, OutputProblem):
-        if problem.repeat or not best.effects:
+        if problem.repeat:
             return _Left(problem, base, best, sure=True)
+        # What the search took for noise may be all that is left.
         problem, best = settled_output(problem, best)
         base = fit_models(problem, [()], [base.fit.theta], rounds=10)[0]
         return _Left(problem, base, best, sure=True)

@@ -96,6 +96,7 @@ def test_a_search_runs_again_where_tolerances_are_strained(
 
     monkeypatch.setattr(searching, "settled", lambda p: (p, base))
     monkeypatch.setattr(searching, "coupled", lambda p, b: p)
+    monkeypatch.setattr(searching, "in_parts", lambda p, b: (p, b))
     monkeypatch.setattr(searching, "output_problem", lambda p: None)
     monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
     monkeypatch.setattr(searching, "_searched", searched)
