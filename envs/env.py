@@ -16,8 +16,8 @@ from envs.hand.spec import HandSpec
 from envs.hand.stance import Stance, stance_of
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample, flatten, push, start_history
-from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
 from envs.physics.backends import make_physics
+from envs.physics.base import ModelFields, Physics, PhysicsOutput, PhysicsState
 from envs.physics.room import overflow_metrics
 from envs.plant import make_plant
 from envs.randomize import draw_variation, model_fields

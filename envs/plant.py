@@ -16,7 +16,7 @@ from envs.hand.drive.model_effects import SceneEffects, make_scene_effects
 from envs.hand.hand_file import HandFile
 from envs.hand.spec import HandSpec, hand_spec
 from envs.hand.stance import Stance
-from envs.physics import ModelFields, Physics, PhysicsOutput, PhysicsState
+from envs.physics.base import ModelFields, Physics, PhysicsOutput, PhysicsState
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 from envs.config.settings.randomize import RandomizeConfig as RandomizeConfig
 from envs.config.settings.randomize import no_randomization as no_randomization
 from envs.hand.spec import HandSpec
-from envs.physics import ModelFields
+from envs.physics.base import ModelFields
 from envs.streams import stream
 
 

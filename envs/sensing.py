@@ -6,7 +6,7 @@ from jaxtyping import Array, Float
 from envs.actuator.surroundings import Imu
 from envs.memory import PerWorldState
 from envs.observations import Sample
-from envs.physics import PhysicsState
+from envs.physics.base import PhysicsState
 from envs.randomize import RandomizeConfig
 from envs.rotations import from_vector, rotate, unrotate
 from envs.streams import stream

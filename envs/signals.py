@@ -11,7 +11,7 @@ from jaxtyping import Array, Float, Shaped
 
 from envs.hand.model import PALM, PAYLOAD, V_SITE
 from envs.hand.spec import HandSpec
-from envs.physics import PhysicsOutput, PhysicsState
+from envs.physics.base import PhysicsOutput, PhysicsState
 from envs.rotations import multiply, rotate, unrotate
 from rewards import safe_norm
 

@@ -9,21 +9,16 @@ import mujoco
 from jaxtyping import Array, Bool, Float, PRNGKeyArray, Shaped
 
 from envs.commands import command_term
+from envs.config.settings.hand import UNIT as UNIT
 from envs.config.settings.hand import HandSettings as HandSettings
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
-from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.signals import Signals
 from rewards import RewardTable
-
-UNIT = "unit"
-"""Measure of an episode that numbers what it belongs to; units are independent.
-
-Where a task has it, an evaluation averages over each unit first.
-"""
 
 
 class HandTask(ABC):

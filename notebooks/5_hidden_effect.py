@@ -35,7 +35,8 @@ import mujoco
 import numpy as np
 
 import fingers_mjx
-from envs.hand.hand_file import EFFECTS, Effect
+from envs.actuator.catalogue import effect_kind
+from envs.hand.hand_file import Effect
 from envs.hand.quantity import Quantity
 from fingers_mjx.evaluation.source import nominal
 from fingers_mjx.play.player import Player
@@ -202,7 +203,7 @@ figure
 bundle, setup = load_bundle_setup(
     Path(fingers_mjx.__file__).parent / "policies" / "crawl"
 )
-width = Quantity(0.04, EFFECTS["deadband"]["half_width_rad"], "user")
+width = Quantity(0.04, effect_kind("deadband").units()["half_width_rad"], "user")
 deadband = Effect("deadband", {"half_width_rad": width}, ("all",))
 calm, steps = nominal(setup), 20 if FAST else 500
 command = np.tile(np.float32([0.12, 0.0, 0.0]), (steps, 1))

@@ -16,7 +16,8 @@ import numpy as np
 from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
-from envs.hand.hand_file import EFFECTS, Effect, load_hand_file, save_hand_file
+from envs.actuator.catalogue import effect_kind
+from envs.hand.hand_file import Effect, load_hand_file, save_hand_file
 from envs.hand.quantity import Quantity
 from sysid.logs.log import MeasuredLog
 from sysid.logs.read import write_log
@@ -33,7 +34,7 @@ def main() -> None:
     out = parser.parse_args().out
     out.mkdir(parents=True, exist_ok=True)
     write_log(finger_log(), out / "finger.parquet")
-    unit = EFFECTS["deadband"]["half_width_rad"]
+    unit = effect_kind("deadband").units()["half_width_rad"]
     width = Quantity(HALF_WIDTH_RAD, unit, "user")
     deadband = Effect("deadband", {"half_width_rad": width}, ("all",))
     hand = dataclasses.replace(load_hand_file(), effects=(deadband,))

@@ -1,10 +1,15 @@
 """What effects need in the scene: room for friction, pairs with the floor, sensors."""
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 import mujoco
 
-from envs.actuator.catalogue import CATALOGUE
-from envs.actuator.effect import EffectKind, Stage
 from envs.hand.hand_file import HandFile
+
+if TYPE_CHECKING:
+    from envs.actuator.effect import EffectKind
 
 SLIGHT_FRICTION_NM = 1e-6
 """A friction that is there, so that a world may have more: MJX plans its constraints
@@ -12,7 +17,14 @@ by the nominal model."""
 
 
 def kinds_of(hand: HandFile) -> tuple[EffectKind, ...]:
-    """Returns the kinds of effects that a hand has, in the order of the catalogue."""
+    """Returns the kinds of effects that a hand has, in the order of the catalogue.
+
+    The catalogue loads JAX, for which a hand without effects does not wait.
+    """
+    if not hand.effects:
+        return ()
+    from envs.actuator.catalogue import CATALOGUE
+
     names = {effect.name for effect in hand.effects}
     return tuple(kind for name, kind in CATALOGUE.items() if name in names)
 
@@ -35,6 +47,10 @@ def add_effect_parts(spec: mujoco.MjSpec, hand: HandFile, floor: str) -> None:
         hand: the hand file.
         floor: name of the floor's geom.
     """
+    if not hand.effects:
+        return
+    from envs.actuator.effect import Stage
+
     kinds = kinds_of(hand)
     if any(Stage.FRICTION in kind.acts for kind in kinds):
         for name in hand.nominal.joint_names:

@@ -5,18 +5,19 @@ this module is the calibrated hand of the paper. Fields ending in `pos`, `offset
 `size` are in the palm frame (dorsal side -x, fingers +z).
 """
 
+from __future__ import annotations
+
 import dataclasses
 import hashlib
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from jaxtyping import Float
 
-from envs.actuator.catalogue import CATALOGUE
 from envs.config.atomic_file import write_atomic
 from envs.config.typed import dump_yaml, limits, load_yaml, to_dict
 from envs.errors import InputError, one_of
@@ -24,11 +25,11 @@ from envs.hand.nominal import NominalHand, vendor_hand
 from envs.hand.places import fingers_at, joints_at
 from envs.hand.quantity import JointQuantity, Quantity, Vector, check_interval, numbers
 
+if TYPE_CHECKING:
+    from envs.actuator.effect import EffectKind
+
 SCHEMA = 1
 DEFAULT_HAND_FILE = Path(__file__).with_name("hand.yaml")
-
-EFFECTS: dict[str, dict[str, str]] = {n: k.units() for n, k in CATALOGUE.items()}
-"""Units of the parameters of all effects, by effect and parameter name."""
 
 _NOT_GIVEN = (("note", ""), ("other", ""))
 
@@ -117,7 +118,7 @@ class HandFile:
         return self.description or vendor_hand()
 
     @property
-    def without_effects(self) -> "HandFile":
+    def without_effects(self) -> HandFile:
         """The hand without effects, which stance and starts are made for."""
         return dataclasses.replace(self, effects=())
 
@@ -208,23 +209,24 @@ def _check_limits(
 
 def _check_effect(name: str, effect: Effect, hand: NominalHand) -> None:
     """Refuses effects, parameters, units and places that the catalogue has not."""
-    if effect.name not in EFFECTS:
-        valid = one_of(EFFECTS, effect.name)
+    kinds = _kinds()
+    if effect.name not in kinds:
+        valid = one_of(kinds, effect.name)
         raise InputError("hand file", f"{name}.name", effect.name, valid)
-    units = EFFECTS[effect.name]
+    kind = kinds[effect.name]
+    units = kind.units()
     found = {key: quantity.unit for key, quantity in effect.parameters.items()}
     if found != units:
         valid = "these parameters with these units: " + json.dumps(units)
         raise InputError("hand file", f"{name}.parameters", found, valid)
-    for key, parameter in CATALOGUE[effect.name].parameters.items():
+    for key, parameter in kind.parameters.items():
         within = limits(parameter.unit, parameter.low, parameter.high)
         _check_limits(f"{name}.parameters.{key}", effect.parameters[key], within)
-    _check_where(name, effect, hand)
+    _check_where(name, effect, kind.scope, hand)
 
 
-def _check_where(name: str, effect: Effect, hand: NominalHand) -> None:
+def _check_where(name: str, effect: Effect, scope: str, hand: NominalHand) -> None:
     """Refuses places that the effect cannot have, and a wrong or missing partner."""
-    scope = CATALOGUE[effect.name].scope
     if scope == "hand" and effect.where != ("all",):
         valid = "[all], for an effect of the whole hand"
         raise InputError("hand file", f"{name}.where", list(effect.where), valid)
@@ -248,7 +250,7 @@ def _check_places(effects: tuple[Effect, ...], hand: NominalHand) -> None:
     """Refuses an effect that one place has twice."""
     taken: set[tuple[str, int]] = set()
     for index, effect in enumerate(effects):
-        fingers = CATALOGUE[effect.name].scope == "finger"
+        fingers = _kinds()[effect.name].scope == "finger"
         find = fingers_at if fingers else joints_at
         new = {(effect.name, place) for place in find(hand, effect.where)}
         if taken & new:
@@ -256,3 +258,10 @@ def _check_places(effects: tuple[Effect, ...], hand: NominalHand) -> None:
             found = list(effect.where)
             raise InputError("hand file", f"effects.{index}.where", found, valid)
         taken |= new
+
+
+def _kinds() -> Mapping[str, EffectKind]:
+    """Returns the catalogue; its equations load JAX, for which no other hand waits."""
+    from envs.actuator.catalogue import CATALOGUE
+
+    return CATALOGUE

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
 from envs.config.settings.hand import UprightSettings as UprightSettings
-from envs.physics import PhysicsState
+from envs.physics.base import PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply
 from envs.signals import Signals

@@ -26,6 +26,7 @@ def add(commands) -> None:
         "learning curves.",
         computes=False,
     )
+    parser.set_defaults(needs_jax=False)
     options.path(parser, "sweep", metavar="DIR", help="directory of fingers sweep")
     what = "configuration that the others are compared with"
     parser.add_argument("--baseline", metavar="NAME", help=what)

@@ -68,6 +68,7 @@ def _add_mjcf(actions) -> None:
         "--driver sim, or to look at in any MuJoCo viewer.",
         computes=False,
     )
+    parser.set_defaults(needs_jax=False)
     options.path(parser, "-o", "--out", help="instead of stdout")
     options.path(parser, "--hand", help="default: the paper's hand")
 

@@ -12,8 +12,8 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from envs.config.atomic_file import write_atomic
+from envs.config.settings.hand import UNIT
 from envs.errors import InputError
-from envs.task import UNIT
 from fingers_deploy.files import open_regular
 from fingers_mjx.evaluation.stats import Summary, summarize
 

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.stats import binomtest, bootstrap
 
 from envs.errors import InputError
 
@@ -101,6 +100,8 @@ def bootstrap_interval(
         return np.nan, np.nan
     if np.ptp(values) == 0:
         return float(values[0]), float(values[0])
+    from scipy.stats import bootstrap  # a second, for which no reader of files waits
+
     left_out = [np.delete(values, i).mean() for i in range(len(values))]
     found = bootstrap(
         (values,),
@@ -160,6 +161,8 @@ def _summary(defined: np.ndarray, interval: tuple[float, float]) -> Summary:
 
 
 def _wilson(values: np.ndarray, confidence: float) -> tuple[float, float]:
+    from scipy.stats import binomtest
+
     test = binomtest(int(values.sum()), len(values))
     found = test.proportion_ci(confidence, method="wilson")
     return float(found.low), float(found.high)

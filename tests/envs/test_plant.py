@@ -7,7 +7,7 @@ import pytest
 
 from envs.config.settings.hand import check_interval
 from envs.errors import InputError
-from envs.physics import PhysicsOutput
+from envs.physics.base import PhysicsOutput
 from envs.physics.room import ROOM
 from envs.registry import make_env
 from envs.tasks.crawl import CrawlConfig

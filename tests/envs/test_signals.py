@@ -13,7 +13,7 @@ from envs.hand.model import FLOOR, PALM, PAYLOAD, V_SITE, build_model
 from envs.hand.nominal import FINGERS, vendor_hand
 from envs.hand.spec import hand_spec
 from envs.hand.stance import load_stance
-from envs.physics import PhysicsOutput, PhysicsState
+from envs.physics.base import PhysicsOutput, PhysicsState
 from envs.signals import Command, extract_signals, tilt
 
 SEED = 20260112

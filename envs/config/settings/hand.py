@@ -7,6 +7,11 @@ from envs.errors import InputError
 
 PHYSICS_DT_S = 0.005
 """Time step of the physics, on every backend [s]."""
+UNIT = "unit"
+"""Measure of an episode that numbers what it belongs to; units are independent.
+
+Where a task has it, an evaluation averages over each unit first.
+"""
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from jaxtyping import Array, Bool, Float
 
 from envs.config.settings.keyboard import KeyboardConfig
 from envs.hand.stance import Stance
-from envs.physics import PhysicsOutput
+from envs.physics.base import PhysicsOutput
 from envs.plant import Plant
 from envs.rotations import unrotate
 from envs.signals import Signals, tilt_from_level

@@ -16,7 +16,7 @@ from envs.hand.nominal import vendor_hand
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
-from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import about_z, multiply, rotate, unrotate
 from envs.signals import Signals

@@ -7,7 +7,7 @@ import mujoco
 from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.config.settings.keyboard import KeyboardVariation as KeyboardVariation
-from envs.physics import ModelFields
+from envs.physics.base import ModelFields
 from envs.streams import stream
 from envs.tasks.keyboard.model import (
     ACTUATION_M,

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import mujoco
 from jaxtyping import Array, Float, PRNGKeyArray
 
-from envs.physics import PhysicsState
+from envs.physics.base import PhysicsState
 from envs.rotations import about_z
 from envs.streams import stream
 

@@ -15,7 +15,7 @@ from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
 from envs.observations import InputTerm, Sample
-from envs.physics import ModelFields, PhysicsOutput, PhysicsState
+from envs.physics.base import ModelFields, PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import multiply, unrotate
 from envs.signals import Signals

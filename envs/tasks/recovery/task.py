@@ -14,7 +14,7 @@ from envs.config.settings.recovery import RecoveryConfig as RecoveryConfig
 from envs.hand.hand_file import HandFile
 from envs.hand.stance import Stance
 from envs.memory import Memory, PerWorldState
-from envs.physics import PhysicsOutput, PhysicsState
+from envs.physics.base import PhysicsOutput, PhysicsState
 from envs.plant import Plant
 from envs.rotations import multiply, unrotate
 from envs.signals import Signals, tilt_from_level

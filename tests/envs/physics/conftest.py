@@ -5,8 +5,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from envs.physics import PhysicsState
 from envs.physics.backends import make_physics
+from envs.physics.base import PhysicsState
 
 XML = """
 <mujoco>

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from envs.errors import InputError
-from envs.physics import PhysicsState
+from envs.physics.base import PhysicsState
 from envs.physics.cpu import CpuPhysics
 
 

@@ -1,6 +1,9 @@
+import logging
+import os
 import subprocess
 import sys
 
+import jax
 import mujoco
 import pytest
 
@@ -41,6 +44,71 @@ def test_missing_warp_is_reported_and_not_the_default(mj_model, monkeypatch):
     with pytest.raises(InputError, match="extra cuda12"):
         make_physics("warp", mj_model, 4, 1)
     assert default_backend() == "cpu"
+
+
+LOG = logging.getLogger("jax._src.xla_bridge")
+
+
+def raising(words, log=""):
+    """Pretends a JAX whose plugin for CUDA fails: it says so, or logs it before."""
+
+    def devices(kind):
+        try:
+            if log:
+                raise ValueError(log)
+        except ValueError:
+            LOG.exception("Jax plugin configuration error")
+        raise RuntimeError(words)
+
+    return devices
+
+
+@pytest.mark.parametrize(
+    ("devices", "fault"),
+    [
+        (lambda kind: ["a GPU"], None),
+        (lambda kind: [], "no device"),
+        (raising("Unable to initialize\n backend"), "Unable to initialize backend"),
+        (raising("Unknown backend", log="no libcuda"), "no libcuda"),
+    ],
+)
+def test_why_cuda_is_not_there_is_what_jax_says(monkeypatch, devices, fault):
+    monkeypatch.setattr(backends, "WARP_INSTALLED", True)
+    monkeypatch.setattr(jax, "devices", devices)
+    monkeypatch.setattr(LOG, "propagate", True)
+    faults = []
+    assert default_backend(faults.append) == ("cpu" if fault else "warp")
+    assert faults == ([fault] if fault else [])
+    assert backends.cuda_fault() == fault
+
+
+BROKEN = """
+import jax._src.xla_bridge as bridge
+bridge.hardware_utils.has_visible_nvidia_gpu = lambda: True
+def fail():
+    raise RuntimeError("no driver")
+def initialize():
+    {initialize}
+"""
+ON_FIRST_USE = 'bridge.register_backend_factory("cuda", fail, fail_quietly=False)'
+
+
+@pytest.mark.parametrize("initialize", ["fail()", ON_FIRST_USE])
+def test_jax_says_why_a_plugin_does_not_start(tmp_path, initialize):
+    """A JAX of its own, with a plugin that is installed and fails."""
+    place = tmp_path / "jax_plugins/xla_cuda12/__init__.py"
+    place.parent.mkdir(parents=True)
+    place.write_text(BROKEN.format(initialize=initialize), "utf-8")
+    program = "from envs.physics.backends import cuda_fault as f; print(f())"
+    path = os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", "")])
+    run = subprocess.run(
+        [sys.executable, "-c", program],
+        env={**os.environ, "PYTHONPATH": path, "JAX_PLATFORMS": ""},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert "no driver" in run.stdout
 
 
 def test_import_prints_nothing():

@@ -4,6 +4,7 @@ import subprocess
 import sys
 
 import pytest
+from support.synthetic_sweep import study, write_sweep
 from support.sysid_logs import small_log
 
 from sysid.logs.read import write_log
@@ -64,6 +65,7 @@ def test_help_imports_nothing_heavy(argv):
         (["sysid", "info", "knee.csv"], {"numpy"}),
         (["log", "convert", "knee.csv", "knee.parquet"], {"numpy"}),
         (["log", "convert", "knee.csv", "knee.mcap"], {"numpy"}),
+        (["hand", "mjcf", "-o", "hand.xml"], {"numpy", "mujoco"}),
     ],
 )
 def test_a_command_that_reads_files_leaves_jax_alone(argv, most, tmp_path, monkeypatch):
@@ -71,6 +73,20 @@ def test_a_command_that_reads_files_leaves_jax_alone(argv, most, tmp_path, monke
     write_log(small_log(), tmp_path / "knee.csv")
     status, said, loaded = run(*argv)
     assert (status, said) == (0, "") and set(loaded) <= most
+
+
+@pytest.mark.parametrize(
+    ("argv", "most"),
+    [
+        (["sweep", "status", "s"], {"numpy"}),
+        (["compare", "s", "--baseline", "base"], {"numpy", "scipy"}),
+    ],
+)
+def test_a_sweep_is_looked_at_without_jax(argv, most, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    write_sweep(tmp_path / "s", study({"lift": 0.02}, 2))
+    status, _, loaded = run(*argv)
+    assert status == 0 and set(loaded) <= most
 
 
 def test_a_command_that_computes_imports_jax(tmp_path):
