@@ -2,7 +2,7 @@
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -87,19 +87,23 @@ class Place:
 
 def about(places: Sequence[Place]) -> list[About]:
     """Returns what loggers say of members: their names inside what they share."""
-    paths = [place.path.absolute() for place in places]
-    root = Path(os.path.commonpath([path.parent for path in paths]))
+    root = shared_root([place.path for place in places])
     together = len(places) > 1
     # The members of `runs/walk` are in `runs/walk/members`.
     shared = root.parent.name if root.name == MEMBERS else root.name
     return [
         About(
-            path.relative_to(root).as_posix(),
+            place.path.absolute().relative_to(root).as_posix(),
             shared if together else "",
             to_dict({"train": place.setup.train, "env": place.setup.env}),
         )
-        for place, path in zip(places, paths, strict=True)
+        for place in places
     ]
+
+
+def shared_root(paths: Iterable[Path]) -> Path:
+    """Returns the directory inside which paths have names of their own."""
+    return Path(os.path.commonpath([path.absolute().parent for path in paths]))
 
 
 def read_end(path: Path) -> Diverged | None:

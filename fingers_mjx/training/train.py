@@ -19,7 +19,13 @@ from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
 from fingers_mjx.training.films import Films, check_drawable
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
-from fingers_mjx.training.member import END_FILE, Place, about, read_end
+from fingers_mjx.training.member import (
+    END_FILE,
+    Place,
+    about,
+    read_end,
+    shared_root,
+)
 from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.session import Session, bound, unset
@@ -163,7 +169,7 @@ def _run(
         ticker = stack.enter_context(Ticker(on_progress, TICK_S))
         session = Session(env, setups)
         begin = _begin(session, files, given, say)
-        places = [_place(one, len(files)) for one in files]
+        places = _places(files)
         if any(given):
             begin = _saved(session, places, begin)
         for place in places:
@@ -215,10 +221,16 @@ def _begin(
     return begin or fresh(session, given)
 
 
-def _place(files: Files, members: int) -> Place:
-    """Returns where the files of a member go."""
-    member, path, facts, _ = files
-    return Place(path.name if members > 1 else "", path, member.setup, facts)
+def _places(files: Sequence[Files]) -> list[Place]:
+    """Returns where the files of members go; each is named by where it differs."""
+    root = shared_root([path for _, path, _, _ in files])
+
+    def name(path: Path) -> str:
+        return path.relative_to(root).as_posix() if len(files) > 1 else ""
+
+    return [
+        Place(name(path), path, member.setup, facts) for member, path, facts, _ in files
+    ]
 
 
 def _saved(session: Session, places: Sequence[Place], begin: StartPoint) -> StartPoint:

@@ -101,6 +101,18 @@ def test_events_name_the_member(together):
     assert {e["member"] for e in events if e["event"] == "checkpoint"} == set(rows)
 
 
+def test_members_of_a_sweep_are_named_by_where_they_differ(tmp_path):
+    """Their run directories all have the name of the stage."""
+    group = [
+        dataclasses.replace(m, run_dir=tmp_path / f"plain/{n}/walk")
+        for n, m in enumerate(members(tmp_path, iterations=2))
+    ]
+    events = []
+    train_population(env(), group, on_progress=events.append)
+    rows = [e["member"] for e in events if e["event"] == "progress"]
+    assert rows[:3] == ["0/walk", "1/walk", "2/walk"]
+
+
 def test_member_goes_on_alone(together, tmp_path):
     """A member's directory is a run's: it resumes without the others."""
     path = tmp_path / "pop"
