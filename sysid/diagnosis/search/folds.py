@@ -45,19 +45,23 @@ def folds_of(
         Nolan, A cross-validatory method for dependent data, 1994.
     """
     m = len(data.valid)
-    settings = [tuple(sorted(logs[i].header.settings.items())) for i in data.log]
-    loads = [
-        (logs[i].header.load.mass_kg, s)
-        for i, s in zip(data.log, settings, strict=True)
-    ]
-    kinds = sorted(set(loads))
-    if len(kinds) > 1:
-        groups = [kinds.index(x) % 2 for x in loads]
-        return np.tile(groups, (m, 1))
+    if len(kinds := sorted(set(each := _kinds(data, logs)))) > 1:
+        return np.tile([kinds.index(kind) % 2 for kind in each], (m, 1))
     records = sorted(set(data.log.tolist()))
     if len(records) > 1:
         return np.tile([records.index(i) % FOLDS for i in data.log], (m, 1))
     return _in_time(data, repeats, BLOCK_S)
+
+
+def are_kinds(data: JointTrack, logs: Sequence[MeasuredLog]) -> bool:
+    """Whether folds are settings of the controller or loads, which stay whole."""
+    return len(set(_kinds(data, logs))) > 1
+
+
+def _kinds(data: JointTrack, logs: Sequence[MeasuredLog]) -> list[tuple]:
+    """Returns load and settings of each piece."""
+    headers = [logs[i].header for i in data.log]
+    return [(h.load.mass_kg, tuple(sorted(h.settings.items()))) for h in headers]
 
 
 def shorter_blocks(
@@ -68,13 +72,13 @@ def shorter_blocks(
 ) -> tuple[Int[np.ndarray, "m p"], float]:
     """Shortens blocks of time until no fold holds nearly all of an error.
 
-    A second, halved while one fold holds more than `MOST_IN_FOLD` of Σ e². Folds by
-    setting, load or record stay.
+    A record if there are several, else a second, halved while one fold holds more than
+    `MOST_IN_FOLD` of Σ e².
 
     Args:
         data: the joint's track.
         repeats: of the motion.
-        fold: of `folds_of`.
+        fold: of `folds_of`, by record or by time.
         error: e, of the nominal simulation.
 
     Returns:
@@ -83,13 +87,13 @@ def shorter_blocks(
     Source:
         Ours.
     """
-    length, shorter = BLOCK_S, _in_time(data, repeats, BLOCK_S)
-    if not np.array_equal(fold, shorter):
-        return fold, length
-    while length > 2.0 * SHORTEST_S and _largest_share(shorter, error) > MOST_IN_FOLD:
+    length = BLOCK_S
+    if _largest_share(fold, error) > MOST_IN_FOLD:
+        fold = _in_time(data, repeats, length)
+    while length > 2.0 * SHORTEST_S and _largest_share(fold, error) > MOST_IN_FOLD:
         length *= 0.5
-        shorter = _in_time(data, repeats, length)
-    return shorter, length
+        fold = _in_time(data, repeats, length)
+    return fold, length
 
 
 def _largest_share(fold: np.ndarray, error: np.ndarray) -> float:

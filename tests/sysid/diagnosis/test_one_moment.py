@@ -3,6 +3,7 @@
 The record is integrated here, by none of the project's simulators, and has no effort.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -112,9 +113,22 @@ def test_blocks_are_as_short_as_the_moment():
     assert SHORTEST_S <= blocks(error)[1] <= 2.0 * SHORTEST_S
 
 
-def test_folds_by_record_stay():
-    error = np.zeros(1200)
-    error[420:450] = 1.0
-    by_record = np.ones((1200, 1), int)
-    fold, length = blocks(error, by_record)
-    assert fold is by_record and length == BLOCK_S
+def test_a_record_that_has_all_of_the_error_is_divided():
+    error = np.full(1200, 1e-3)
+    error[300:600] = 1.0
+    record = (np.arange(1200)[:, None] // 300) % folds.FOLDS
+    fold, length = blocks(error, record)
+    assert length == BLOCK_S and len(set(fold[300:600].ravel())) == folds.FOLDS
+    error[:] = 1.0
+    assert blocks(error, record)[0] is record
+
+
+def test_loads_stay_whole():
+    """What a load does shows in the records with it, and in no other."""
+    logs, mechanism = recorded()
+    heavy = replace(logs[0].header, load=replace(logs[0].header.load, mass_kg=0.2))
+    logs = [logs[0], replace(logs[0], header=heavy)]
+    (track,) = all_tracks(logs, mechanism)
+    problem = problem_of(track, logs, mechanism, company=False)
+    base = SimpleNamespace()
+    assert in_parts(problem, base) == (problem, base)
