@@ -57,8 +57,8 @@ for group in ("fingers.tasks", "fingers.drivers", "fingers.logs"):
         except InputError as error:
             broken.append(str(error))
 devices = [f"{d.platform} {d.device_kind}" for d in jax.devices()]
-answer = {"devices": devices, "backend": default_backend(), "broken": broken}
-answer["cuda"] = cuda
+answer = {"devices": devices, "backend": default_backend(), "broken": broken,
+          "cuda": cuda}
 print("\\n" + json.dumps(answer))
 """
 DRAWING = """

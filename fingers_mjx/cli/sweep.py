@@ -91,17 +91,18 @@ def _check(args: argparse.Namespace) -> None:
         raise InputError("fingers sweep", "DIR", args.directory, valid)
     if args.out is None and not args.dry_run:
         raise InputError("fingers sweep", "-o", "", "the directory of the sweep")
-    args.backend = _written(args.spec, args.settings).backend
+    args.written = _written(args.spec, args.settings)
+    args.backend = args.written.backend
 
 
 def run(args: argparse.Namespace) -> int:
     """Runs a sweep, or shows how it stands."""
     if _asks(args):
         return _show(args.directory)
-    return _run(args.spec, args.settings, args.out)
+    return _run(args.spec, args.written, args.out)
 
 
-def _run(source: Path, assignments: list[str], out: Path) -> int:
+def _run(source: Path, written: Sweep, out: Path) -> int:
     """Runs a sweep; the report goes to stdout."""
     prepare_jax()
     import jax
@@ -116,7 +117,7 @@ def _run(source: Path, assignments: list[str], out: Path) -> int:
     # This process trains nothing; the memory of a GPU is for those that do.
     jax.config.update("jax_platforms", "cpu")
     options.check_directory("-o", out)
-    written, root = _written(source, assignments), out.absolute()
+    root = out.absolute()
     with sweep_lock(root):
         backend = partial(machine_backend, note_failed_cuda)
         spec = keep_sweep(written, source, root, backend)

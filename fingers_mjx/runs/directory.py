@@ -176,28 +176,29 @@ def _read_run(path: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def locked(path: Path, valid: str) -> Iterator[None]:
+def locked(path: Path, valid: str, wait_s: float | None = None) -> Iterator[None]:
     """Holds the lock file `path`; the system frees it however the process ends.
 
     Args:
         path: the file, which stays.
         valid: what would be valid where another process holds it.
+        wait_s: how long it is tried; `LOCK_WAIT_S` if not given [s].
 
     Raises:
         InputError: another process holds it; names the directory of `path`.
     """
     handle = os.open(path, os.O_RDWR | os.O_CREAT, 0o644)
     try:
-        if not _taken(handle):
+        if not _taken(handle, LOCK_WAIT_S if wait_s is None else wait_s):
             raise InputError(path.parent, "", "a run in progress", valid)
         yield
     finally:
         os.close(handle)
 
 
-def _taken(handle: int) -> bool:
+def _taken(handle: int, wait_s: float) -> bool:
     """Locks an open file; whether nobody else held it all the time."""
-    last_s = time.monotonic() + LOCK_WAIT_S
+    last_s = time.monotonic() + wait_s
     while True:
         try:
             fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)

@@ -9,7 +9,6 @@ import json
 import os
 import sys
 import threading
-import time
 import traceback
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
@@ -111,16 +110,8 @@ def _raising(error: Exception) -> Callable[[], None]:
 def _hold(stack: ExitStack, directory: Path) -> None:
     """Locks a member; waits for a worker that is about to end."""
     directory.mkdir(parents=True, exist_ok=True)
-    last_s = time.monotonic() + LOCK_WAIT_S
     valid = "a member that no other process is training"
-    while True:
-        try:
-            stack.enter_context(locked(directory / LOCK_FILE, valid))
-            return
-        except InputError:
-            if time.monotonic() > last_s:
-                raise
-            time.sleep(0.2)
+    stack.enter_context(locked(directory / LOCK_FILE, valid, LOCK_WAIT_S))
 
 
 if __name__ == "__main__":

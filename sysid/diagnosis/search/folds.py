@@ -45,7 +45,9 @@ def folds_of(
         Nolan, A cross-validatory method for dependent data, 1994.
     """
     m = len(data.valid)
-    if len(kinds := sorted(set(each := _kinds(data, logs)))) > 1:
+    each = _kinds(data, logs)
+    kinds = sorted(set(each))
+    if len(kinds) > 1:
         return np.tile([kinds.index(kind) % 2 for kind in each], (m, 1))
     records = sorted(set(data.log.tolist()))
     if len(records) > 1:
@@ -53,7 +55,7 @@ def folds_of(
     return _in_time(data, repeats, BLOCK_S)
 
 
-def are_kinds(data: JointTrack, logs: Sequence[MeasuredLog]) -> bool:
+def stay_whole(data: JointTrack, logs: Sequence[MeasuredLog]) -> bool:
     """Whether folds are settings of the controller or loads, which stay whole."""
     return len(set(_kinds(data, logs))) > 1
 

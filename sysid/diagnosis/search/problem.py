@@ -18,7 +18,7 @@ from jaxtyping import Bool, Float, Int
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
 from sysid.diagnosis.replay.residuals import equation_error
-from sysid.diagnosis.search.folds import BLOCK_S, are_kinds, folds_of
+from sysid.diagnosis.search.folds import BLOCK_S, folds_of, stay_whole
 from sysid.diagnosis.search.lanes import in_lanes, lanes_first
 from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.parameters import Space
@@ -51,7 +51,7 @@ class Problem:
         weight: less than one where sampling may hide fast changes.
         known: which part of the joint can be examined; see `JointDrive`.
         block_s: length of stretches that are held out [s].
-        kinds: whether folds are settings or loads instead, which stay whole.
+        whole: whether folds are settings or loads instead, which are not divided.
     """
 
     channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
@@ -65,7 +65,7 @@ class Problem:
     weight: Float[np.ndarray, "2 m p"]
     known: str = "both"
     block_s: float = BLOCK_S
-    kinds: bool = False
+    whole: bool = False
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -290,5 +290,5 @@ def make_problem(
         repeat=repeat,
         weight=np.ones((2, *data.valid.shape)),
         known=known,
-        kinds=are_kinds(data, logs),
+        whole=stay_whole(data, logs),
     )

@@ -112,7 +112,7 @@ def search(problem: Problem) -> Search:
 
 def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
     """Holds out parts of a moment that alone has nearly all of the nominal error."""
-    if problem.kinds:
+    if problem.whole:
         return problem, base
     error = np.hypot(*base.fit.residual.reshape(2, *problem.fold.shape))
     fold, block_s = shorter_blocks(problem.data, problem.repeat, problem.fold, error)
