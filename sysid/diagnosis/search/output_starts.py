@@ -7,21 +7,13 @@ priors count for nothing: what others can take up of it they do, unless the effe
 fitted alone at first.
 """
 
-from collections.abc import Sequence
-from dataclasses import replace
-
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import (
-    Model,
-    at_nominal,
-    fit_models,
-    task_of,
-)
+from sysid.diagnosis.search.alone import costs, fitted_alone
+from sysid.diagnosis.search.candidate import Model, at_nominal, fit_models
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.parameters import Space
-from sysid.least_squares import fit_all
 
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""
@@ -79,44 +71,16 @@ def output_starts(
     sets, space = [m.effects for m in proposed], problem.space
     beside = [_beside(space, smaller, m) for m in proposed]
     fitted = [m.fit.theta for m in proposed]
-    closer = _costs(problem, sets, beside) <= _costs(problem, sets, fitted)
+    closer = costs(problem, sets, beside) <= costs(problem, sets, fitted)
     near = np.where(closer[:, None], beside, fitted)
     begin = [at_nominal(problem, m) for m in proposed]
-    fits = _fitted_alone(problem, [*sets, *sets], [*begin, *beside])
+    fits = fitted_alone(problem, [*sets, *sets], [*begin, *beside])
     alone, added = fits[: len(sets)], fits[len(sets) :]
     chosen = dict.fromkeys(range(min(EQUATIONS_TRIED, len(sets))))
     for thetas in (alone, added):
-        ranked = np.argsort(_costs(problem, sets, thetas))
+        ranked = np.argsort(costs(problem, sets, thetas))
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
     return [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
-
-
-def _costs(
-    problem: OutputProblem,
-    sets: Sequence[tuple[str, ...]],
-    thetas: Sequence[Float[np.ndarray, " n"]],
-) -> Float[np.ndarray, " s"]:
-    """Returns squared errors and penalties of the priors, for every set."""
-    errors = np.sum(problem.residual(np.stack(thetas)) ** 2, 1)
-    pairs = zip(sets, thetas, strict=True)
-    return errors + np.array([_penalty(problem.space, *pair) for pair in pairs])
-
-
-def _fitted_alone(
-    problem: OutputProblem,
-    sets: Sequence[tuple[str, ...]],
-    starts: Sequence[Float[np.ndarray, " n"]],
-) -> list[Float[np.ndarray, " n"]]:
-    """Fits the last effect of each model; all else stays where it begins."""
-    tasks = [
-        replace(
-            task_of(problem, effects, start),
-            start=start,
-            free=np.array(problem.space.of(effects[-1])),
-        )
-        for effects, start in zip(sets, starts, strict=True)
-    ]
-    return [fit.theta for fit in fit_all(problem.residual, tasks, 5)]
 
 
 def _beside(space: Space, smaller: Model, larger: Model) -> Float[np.ndarray, " n"]:
@@ -125,11 +89,3 @@ def _beside(space: Space, smaller: Model, larger: Model) -> Float[np.ndarray, " 
     own = space.of(larger.effects[-1])
     theta[own] = larger.fit.theta[own]
     return theta
-
-
-def _penalty(space: Space, effects: tuple[str, ...], theta: np.ndarray) -> float:
-    """Returns Σ ((θ − θ⁰) / σ)² over the nuisance parameters."""
-    sds = space.prior_sds(effects)
-    kept = np.isfinite(sds) & (sds > 0.0)
-    kept[[i for e in effects for i in space.of(e)]] = False
-    return float(np.sum(((theta - space.nominal)[kept] / sds[kept]) ** 2))

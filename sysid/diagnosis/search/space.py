@@ -43,6 +43,8 @@ _GRIDS = {
     "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
     # Half the width of a resonance apart: ω ∝ 1 / √C.
     "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
+    # Between two arrivals of targets, where the error has kinks that hold a fit.
+    "s": tuple(np.arange(0.1, 5.0, 0.2).tolist()),
 }
 _STEP_RANGE = (0.015, 1.0)
 _RECIPROCAL = {

@@ -1,6 +1,9 @@
 """One stage of the search: every effect that a model lacks is added and fitted."""
 
+import numpy as np
+
 from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
+from sysid.diagnosis.search.alone import costs, fitted_alone
 from sysid.diagnosis.search.candidate import (
     Model,
     at_nominal,
@@ -16,6 +19,9 @@ from sysid.diagnosis.search.starts import starts_of
 
 REFINED = 3
 """Number of candidates whose fits are continued."""
+
+ALONE_TRIED = 6
+"""Number of effects that go on from where they come nearest alone, at nominal."""
 
 OFF_PRIOR_PENALTY = 16.0
 """Penalty of nuisance parameters above which a fit is also continued from nominal."""
@@ -68,8 +74,41 @@ def _extended(problem: Problem, model: Model) -> list[Model]:
     jobs = [(s, t) for s, name in zip(sets, names, strict=True) for t in starts[name]]
     shared = dict(zip(model.fit.free.tolist(), model.fit.jacobian.T, strict=True))
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], shared)
-    stage = _refined(problem, model, _best(models))
+    alone = _nearest_alone(problem, model, starts)
+    stage = _refined(problem, model, _best(models), alone)
     return _simplest_first(problem, model, stage)
+
+
+def _nearest_alone(
+    problem: Problem, model: Model, starts: dict[str, list]
+) -> list[tuple[tuple[str, ...], np.ndarray]]:
+    """Returns the effects that come nearest alone, all else at nominal.
+
+    A large effect bends the smaller model's nuisance parameters far off their priors,
+    and finds no way back with the slopes of there, which are shared.
+    """
+    nominal = at_nominal(problem, model)
+    if model.penalty <= OFF_PRIOR_PENALTY:
+        return []
+    begin = [
+        ((*model.effects, name), theta)
+        for name, thetas in starts.items()
+        for theta in thetas[-1:]
+        if _keeps_nominal(problem, name, theta, nominal)
+    ]
+    sets = [effects for effects, _ in begin]
+    thetas = fitted_alone(problem, sets, [theta for _, theta in begin])
+    nearest = np.argsort(costs(problem, sets, thetas))[:ALONE_TRIED]
+    return [(sets[k], thetas[k]) for k in nearest]
+
+
+def _keeps_nominal(
+    problem: Problem, name: str, theta: np.ndarray, nominal: np.ndarray
+) -> bool:
+    """Whether a start of an effect leaves all else at nominal."""
+    others = np.ones(len(theta), bool)
+    others[problem.space.of(name)] = False
+    return bool(np.array_equal(theta[others], nominal[others]))
 
 
 def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:
@@ -78,7 +117,12 @@ def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:
     return effect not in effects and not taken
 
 
-def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
+def _refined(
+    problem: Problem,
+    smaller: Model,
+    stage: list[Model],
+    alone: list[tuple[tuple[str, ...], np.ndarray]],
+) -> list[Model]:
     """Continues the fits that are nearest to the records; best first.
 
     Masses, loads and rotors that a large effect has moved off their priors compensate
@@ -92,7 +136,7 @@ def _refined(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     close = ranked[:REFINED]
     close += [m for m, g in list(zip(ranked, gains, strict=True))[REFINED:] if g > far]
     near += [m for m in close if m not in near]
-    jobs = [(m.effects, m.fit.theta) for m in near]
+    jobs = [(m.effects, m.fit.theta) for m in near] + alone
     jobs += [
         (m.effects, at_nominal(problem, m))
         for m in near

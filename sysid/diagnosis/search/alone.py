@@ -1,0 +1,64 @@
+"""Fits of one effect alone: nothing else may take up what it does."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float
+
+from sysid.diagnosis.search.candidate import task_of
+from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.search.problem import Problem
+from sysid.least_squares import fit_all
+
+Sets = Sequence[tuple[str, ...]]
+Thetas = Sequence[Float[np.ndarray, " n"]]
+
+
+def fitted_alone(problem: Problem, sets: Sets, starts: Thetas) -> list[np.ndarray]:
+    """θ̂_e = argmin ‖r(θ)‖² over the last effect e of each set; all else stays.
+
+    Args:
+        problem: residuals of a joint.
+        sets: released effects of every model.
+        starts: first coordinates of every model [1].
+
+    Returns:
+        The coordinates of every model.
+
+    Source:
+        Ours.
+    """
+    tasks = [
+        replace(
+            task_of(problem, effects, start),
+            start=start,
+            free=np.array(problem.space.of(effects[-1])),
+        )
+        for effects, start in zip(sets, starts, strict=True)
+    ]
+    return [fit.theta for fit in fit_all(problem.residual, tasks, 5)]
+
+
+def costs(problem: Problem, sets: Sets, thetas: Thetas) -> Float[np.ndarray, " s"]:
+    """‖r(θ)‖² + Σ_i ((θ_i − θ⁰_i) / σ_i)² of every set at its coordinates.
+
+    Args:
+        problem: residuals of a joint.
+        sets: released effects of every model.
+        thetas: coordinates of every model [1].
+
+    Source:
+        As `fit_models`.
+    """
+    errors = np.sum(problem.residual(np.stack(thetas)) ** 2, 1)
+    pairs = zip(sets, thetas, strict=True)
+    return errors + np.array([_penalty(problem.space, *pair) for pair in pairs])
+
+
+def _penalty(space: Space, effects: tuple[str, ...], theta: np.ndarray) -> float:
+    """Returns Σ ((θ − θ⁰) / σ)² over the nuisance parameters."""
+    sds = space.prior_sds(effects)
+    kept = np.isfinite(sds) & (sds > 0.0)
+    kept[[i for e in effects for i in space.of(e)]] = False
+    return float(np.sum(((theta - space.nominal)[kept] / sds[kept]) ** 2))

@@ -1,0 +1,66 @@
+"""Readings that come late by two arrivals of targets: far from any small delay.
+
+The record is integrated here, by none of the project's simulators.
+"""
+
+import numpy as np
+import pytest
+
+from envs.physics.quiet_mujoco import mujoco
+from sysid.diagnosis.diagnose import diagnose
+from sysid.diagnosis.search import space
+from sysid.drive import JointDrive, Nominal
+from sysid.logs.log import make_log
+from sysid.mechanism import model_mechanism
+
+RATE_HZ, DT, LENGTH_S, SENT_HZ = 200.0, 0.00025, 6.0, 50.0
+KP, KD, INERTIA, LATE_S = 3.1, 0.11, 0.01325, 0.0475
+ALIKE = {"sensor_latency", "transport_delay"}
+AXIS = """
+<mujoco><worldbody><body><joint name="servo" axis="0 0 1" armature="0.002"/>
+<inertial pos="0.15 0 0" mass="0.5" diaginertia="1e-5 1e-5 1e-5"/>
+</body></worldbody></mujoco>"""
+
+
+def recorded(seed=0):
+    """A log of waves, sent at 50 Hz, whose angle and effort are read late."""
+    rng = np.random.default_rng(seed)
+    t_s = np.arange(round(LENGTH_S / DT)) * DT
+    sent_s = np.floor(t_s * SENT_HZ + 1e-9) / SENT_HZ
+    hz, phases = (0.4, 0.9, 1.7, 2.6, 3.4), rng.uniform(0.0, 2.0 * np.pi, 5)
+    waves = [np.sin(2 * np.pi * f * sent_s + p) for f, p in zip(hz, phases, strict=True)]
+    cmd, state = 0.12 * np.sum(waves, 0), np.zeros((len(t_s), 2))
+    q, v = cmd[0], 0.0
+    for k, target in enumerate(cmd):
+        torque = KP * (target - q) - KD * v
+        state[k] = q, torque
+        v += DT * torque / INERTIA
+        q += DT * v
+    every, late = round(1.0 / RATE_HZ / DT), round(LATE_S / DT)
+    seen = state[np.maximum(np.arange(0, len(cmd), every) - late, 0)]
+    noise = rng.normal(size=seen.shape) * (2e-6, 1e-4)
+    pos, effort = (seen + noise).T
+    columns = {"cmd.servo": cmd[::every], "pos.servo": pos, "tau.servo": effort}
+    log = make_log(("servo",), t_s[::every], columns)
+    gains = Nominal(3.0, tolerance=0.05), Nominal(0.1, tolerance=0.1)
+    model = mujoco.MjModel.from_xml_string(AXIS)
+    return [log], model_mechanism(model, {"servo": JointDrive(*gains)})
+
+
+@pytest.fixture(scope="module")
+def record():
+    return recorded()
+
+
+def test_a_long_latency_is_found_and_its_size(record):
+    said = diagnose(*record)
+    assert said.causes[0].effect in ALIKE
+    (size,) = said.causes[0].parameters.values()
+    assert size.value == pytest.approx(LATE_S, abs=0.003)
+
+
+def test_from_one_small_latency_alone_it_is_not(record, monkeypatch):
+    monkeypatch.delitem(space._GRIDS, "s")
+    said = diagnose(*record)
+    sizes = [p.value for c in said.causes for p in c.parameters.values()]
+    assert not any(abs(size - LATE_S) < 0.003 for size in sizes)
