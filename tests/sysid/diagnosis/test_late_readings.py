@@ -28,7 +28,9 @@ def recorded(seed=0):
     t_s = np.arange(round(LENGTH_S / DT)) * DT
     sent_s = np.floor(t_s * SENT_HZ + 1e-9) / SENT_HZ
     hz, phases = (0.4, 0.9, 1.7, 2.6, 3.4), rng.uniform(0.0, 2.0 * np.pi, 5)
-    waves = [np.sin(2 * np.pi * f * sent_s + p) for f, p in zip(hz, phases, strict=True)]
+    waves = [
+        np.sin(2 * np.pi * f * sent_s + p) for f, p in zip(hz, phases, strict=True)
+    ]
     cmd, state = 0.12 * np.sum(waves, 0), np.zeros((len(t_s), 2))
     q, v = cmd[0], 0.0
     for k, target in enumerate(cmd):
