@@ -6,8 +6,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import task_of
-from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.search.candidate import nuisance_penalty, task_of
 from sysid.diagnosis.search.problem import Problem
 from sysid.least_squares import fit_all
 
@@ -41,7 +40,7 @@ def fitted_alone(problem: Problem, sets: Sets, starts: Thetas) -> list[np.ndarra
 
 
 def costs(problem: Problem, sets: Sets, thetas: Thetas) -> Float[np.ndarray, " s"]:
-    """‖r(θ)‖² + Σ_i ((θ_i − θ⁰_i) / σ_i)² of every set at its coordinates.
+    """‖r(θ)‖² + Σ_i ((θ_i − θ⁰_i) / σ_i)² of every set, i all but its effects' own.
 
     Args:
         problem: residuals of a joint.
@@ -49,16 +48,12 @@ def costs(problem: Problem, sets: Sets, thetas: Thetas) -> Float[np.ndarray, " s
         thetas: coordinates of every model [1].
 
     Source:
-        As `fit_models`.
+        As `Model.score`, of all data.
     """
     errors = np.sum(problem.residual(np.stack(thetas)) ** 2, 1)
-    pairs = zip(sets, thetas, strict=True)
-    return errors + np.array([_penalty(problem.space, *pair) for pair in pairs])
-
-
-def _penalty(space: Space, effects: tuple[str, ...], theta: np.ndarray) -> float:
-    """Returns Σ ((θ − θ⁰) / σ)² over the nuisance parameters."""
-    sds = space.prior_sds(effects)
-    kept = np.isfinite(sds) & (sds > 0.0)
-    kept[[i for e in effects for i in space.of(e)]] = False
-    return float(np.sum(((theta - space.nominal)[kept] / sds[kept]) ** 2))
+    return errors + np.array(
+        [
+            nuisance_penalty(problem, task_of(problem, effects, theta), effects, theta)
+            for effects, theta in zip(sets, thetas, strict=True)
+        ]
+    )

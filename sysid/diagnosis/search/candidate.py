@@ -223,7 +223,7 @@ def _scored(problem, sets, tasks, fits) -> list[Model]:
     each = zip(sets, tasks, fits, predicted, strict=True)
     for effects, task, fit, held in each:
         errors = np.sum(fit.residual.reshape(2, -1) ** 2, 1) / np.maximum(counted, 1)
-        penalty = _penalty(problem, task, effects, fit.theta)
+        penalty = nuisance_penalty(problem, task, effects, fit.theta)
         score = held.error + penalty if np.isfinite(held.error) else np.inf
         cost = noise_cost(problem, fit.theta, float(errors[1]))
         tau = _correlation(problem, fit)
@@ -243,8 +243,20 @@ def _correlation(problem: Problem, fit: Fit) -> float:
     return float(power @ times / max(power.sum(), 1e-300))
 
 
-def _penalty(problem: Problem, task: Task, effects, theta: np.ndarray) -> float:
-    """Squared distance of the nuisance parameters from nominal [prior deviations²]."""
+def nuisance_penalty(
+    problem: Problem, task: Task, effects: tuple[str, ...], theta: np.ndarray
+) -> float:
+    """Σ_i ((θ_i − θ⁰_i) / σ_i)² over all but the parameters of the effects [1].
+
+    Args:
+        problem: residuals of a joint.
+        task: of the fit, with θ⁰ and σ.
+        effects: released in it.
+        theta: coordinates θ [1].
+
+    Source:
+        Gaussian priors.
+    """
     slots = problem.space.slots
     kept = [i for i in task.free if slots[i].effect not in effects]
     return float(np.sum(((theta - task.center)[kept] / task.deviation[kept]) ** 2))

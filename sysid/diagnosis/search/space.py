@@ -43,7 +43,7 @@ _GRIDS = {
     "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
     # Half the width of a resonance apart: ω ∝ 1 / √C.
     "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
-    # Between two arrivals of targets, where the error has kinks that hold a fit.
+    # A delay off by whole intervals of the targets has a kink there, which holds a fit.
     "s": tuple(np.arange(0.1, 5.0, 0.2).tolist()),
 }
 _STEP_RANGE = (0.015, 1.0)
@@ -234,7 +234,8 @@ def _with_prior(slot: Slot, known: Nominal) -> Slot:
     starts = slot.starts
     if slot.kind != "log" and not absent:
         near = (0.5 * nominal, 0.8 * nominal, 1.25 * nominal, 2.0 * nominal)
-        starts = near + tuple(u for u in starts if u > nominal)
+        beyond = starts if slot.unit == "s" else [u for u in starts if u > nominal]
+        starts = (*near, *beyond)
     low = min(slot.low, -0.8) if slot.effect == "armature" else slot.low
     if slot.kind != "log" and slot.unit not in UNIVERSAL:
         # What the drive file says may be far from what occurs in these records.

@@ -20,7 +20,7 @@ from sysid.diagnosis.search.starts import starts_of
 REFINED = 3
 """Number of candidates whose fits are continued."""
 
-ALONE_TRIED = 6
+ALONE_CONTINUED = 6
 """Number of effects that go on from where they come nearest alone, at nominal."""
 
 OFF_PRIOR_PENALTY = 16.0
@@ -87,18 +87,20 @@ def _nearest_alone(
     A large effect bends the smaller model's nuisance parameters far off their priors,
     and finds no way back with the slopes of there, which are shared.
     """
-    nominal = at_nominal(problem, model)
     if model.penalty <= OFF_PRIOR_PENALTY:
         return []
+    nominal = at_nominal(problem, model)
     begin = [
         ((*model.effects, name), theta)
         for name, thetas in starts.items()
         for theta in thetas[-1:]
         if _keeps_nominal(problem, name, theta, nominal)
     ]
+    if not begin:
+        return []
     sets = [effects for effects, _ in begin]
     thetas = fitted_alone(problem, sets, [theta for _, theta in begin])
-    nearest = np.argsort(costs(problem, sets, thetas))[:ALONE_TRIED]
+    nearest = np.argsort(costs(problem, sets, thetas))[:ALONE_CONTINUED]
     return [(sets[k], thetas[k]) for k in nearest]
 
 
@@ -143,8 +145,7 @@ def _refined(
         if m.penalty > OFF_PRIOR_PENALTY
     ]
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=10)
-    again = {m.effects: m for m in _best(models)}
-    return _ordered(problem, smaller, [again.get(m.effects, m) for m in stage])
+    return _ordered(problem, smaller, _best([*models, *stage]))
 
 
 def _ordered(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:

@@ -75,6 +75,8 @@ def _matters(slot: Slot) -> float:
         return slot.nominal + 0.1
     if slot.many_optima:
         return 0.1
+    if slot.unit == "s":  # 2 ms; fits begin from many delays
+        return slot.nominal + 0.1
     if slot.starts:
         grid = [u for u in slot.starts if u > 0.0]
         return slot.nominal + sorted(grid)[len(grid) // 2]

@@ -1,14 +1,20 @@
 """Readings that come late by two arrivals of targets: far from any small delay.
 
-The record is integrated here, by none of the project's simulators.
+The record of the quick tests is integrated here, by none of the project's simulators.
 """
+
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from benchmarks.diagnosis.battery import run_task
+from benchmarks.diagnosis.plan import wide_plan
 from envs.physics.quiet_mujoco import mujoco
-from sysid.diagnosis.diagnose import diagnose
-from sysid.diagnosis.search import space
+from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search import space, stage
+from sysid.diagnosis.verdict.observability import _matters
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
@@ -66,3 +72,37 @@ def test_from_one_small_latency_alone_it_is_not(record, monkeypatch):
     said = diagnose(*record)
     sizes = [p.value for c in said.causes for p in c.parameters.values()]
     assert not any(abs(size - LATE_S) < 0.003 for size in sizes)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("continued, found", [(6, True), (0, False)])
+def test_a_latency_that_bends_all_else_needs_a_fit_alone(monkeypatch, continued, found):
+    """As large as 3.7 times what shows: gains leave their tolerances 17 times."""
+    monkeypatch.setattr(stage, "ALONE_CONTINUED", continued)
+    said = run_task(wide_plan(2678377, [15])[0])
+    assert said.effects == ("sensor_latency",)
+    assert (said.causes == ("sensor_latency",)) == found
+
+
+def test_a_fit_from_elsewhere_does_not_take_the_place_of_a_better_one(monkeypatch):
+    def model(cost):
+        fit = SimpleNamespace(cost=cost, theta=np.zeros(1))
+        return SimpleNamespace(effects=("e",), fit=fit, penalty=0.0)
+
+    good, worse = model(1.0), model(2.0)
+    monkeypatch.setattr(stage, "fit_models", lambda *_, **__: [worse])
+    monkeypatch.setattr(stage, "_ordered", lambda problem, smaller, models: models)
+    monkeypatch.setattr(stage, "log_likelihood_gain", lambda *_: 0.0)
+    problem = SimpleNamespace(samples=1)
+    alone = [(("e",), np.zeros(1))]
+    assert stage._refined(problem, model(3.0), [good], alone) == [good]
+
+
+def test_a_delay_of_two_milliseconds_matters(record):
+    """Wherever fits begin: what would not show 2 ms cannot show a delay."""
+    logs, mechanism = record
+    (track,) = all_tracks(logs, mechanism)
+    problem = problem_of(track, logs, mechanism, company=False)
+    for slot in problem.space.slots:
+        if slot.name in ("latency_s", "delay_s"):
+            assert (_matters(slot) - slot.nominal) * slot.scale == pytest.approx(0.002)
