@@ -15,7 +15,7 @@ from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import output_starts
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
-from sysid.diagnosis.search.starts import starts_of
+from sysid.diagnosis.search.starts import many_optima, starts_of
 
 REFINED = 3
 """Number of candidates whose fits are continued."""
@@ -89,28 +89,17 @@ def _nearest_alone(
     """
     if model.penalty <= OFF_PRIOR_PENALTY:
         return []
-    nominal = at_nominal(problem, model)
-    begin = [
-        ((*model.effects, name), theta)
+    begin = {
+        (*model.effects, name): thetas[-1]
         for name, thetas in starts.items()
-        for theta in thetas[-1:]
-        if _keeps_nominal(problem, name, theta, nominal)
-    ]
+        if not many_optima(problem, name)
+    }
     if not begin:
         return []
-    sets = [effects for effects, _ in begin]
-    thetas = fitted_alone(problem, sets, [theta for _, theta in begin])
+    sets = list(begin)
+    thetas = fitted_alone(problem, sets, list(begin.values()))
     nearest = np.argsort(costs(problem, sets, thetas))[:ALONE_CONTINUED]
     return [(sets[k], thetas[k]) for k in nearest]
-
-
-def _keeps_nominal(
-    problem: Problem, name: str, theta: np.ndarray, nominal: np.ndarray
-) -> bool:
-    """Whether a start of an effect leaves all else at nominal."""
-    others = np.ones(len(theta), bool)
-    others[problem.space.of(name)] = False
-    return bool(np.array_equal(theta[others], nominal[others]))
 
 
 def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:

@@ -25,12 +25,12 @@ OPTIMA = 16
 
 
 def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str, list]:
-    """Returns the best starts of every effect: near the model, and from nominal.
+    """Returns the best starts of every effect: near the model, the last from nominal.
 
     A start counts by the error that remains when the nuisance parameters follow it
     linearly. One that changes nothing, a limit that the record does not reach, comes
     last: it has no gradient. A parameter that is already far off its prior goes on from
-    there.
+    there. Effects with many optima have none from nominal.
     """
     result: dict[str, list] = {name: [] for name in names}
     for name in names:
@@ -39,7 +39,7 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     fitted, nominal = model.fit.theta, at_nominal(problem, model)
     for origin, count in ((fitted, 2), (nominal, 1)):
         some = (
-            names if count == 2 else [n for n in names if not _many_optima(problem, n)]
+            names if count == 2 else [n for n in names if not many_optima(problem, n)]
         )
         owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
         thetas = np.stack([origin, *(t for _, t in owned)])
@@ -55,7 +55,7 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
 
 def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
     """Returns the coordinates that are tried for an effect."""
-    if not _many_optima(problem, name):
+    if not many_optima(problem, name):
         return [_placed(origin, start) for start in problem.space.starts(name)]
     index = problem.space.of(name)[0]
     starts = [_placed(origin, {index: u}) for u in _grid_optima(problem, origin, index)]
@@ -125,7 +125,8 @@ def _banded(x: np.ndarray, delay: float, count: int) -> Float[np.ndarray, "c m p
     return np.sum(parts, 0)
 
 
-def _many_optima(problem: Problem, name: str) -> bool:
+def many_optima(problem: Problem, name: str) -> bool:
+    """Whether the error has many optima over an effect's parameter."""
     return problem.space.slots[problem.space.of(name)[0]].many_optima
 
 
