@@ -136,7 +136,10 @@ class Player:
         drive = self._advance(episode.model, data, memory, target)
         memory = dataclasses.replace(memory, drive=drive)
         judged = self._judge(memory, before, _output(data), self.action)
-        episode.memory, row = judged
+        memory, row = judged
+        # As in training, signals of a step know the target before it.
+        target = jnp.asarray(target, memory.target.dtype)
+        episode.memory = dataclasses.replace(memory, target=target)
         return jax.device_get(row)
 
     def take_over(self, other: "Player") -> None:

@@ -54,6 +54,17 @@ def played(player):
     return player.play(KEY, STEPS)
 
 
+def test_signals_know_the_targets_as_in_training(player, in_environment):
+    """A measure of what lags behind its target needs the one of the step before."""
+    episode = player.begin(KEY)
+    for state in in_environment[1:4]:
+        player.step(episode)
+        asked = np.asarray(state.memory.target)
+        np.testing.assert_allclose(episode.memory.target, asked, atol=1e-4)
+    first = np.asarray(in_environment[0].memory.target)
+    assert np.abs(episode.memory.target - first).max() > 1e-2
+
+
 def test_commands_and_noise_are_those_of_training(played, in_environment):
     commands = np.stack([s.signals.command for s in in_environment[1:]])
     assert len(np.unique(commands, axis=0)) > 2
