@@ -22,6 +22,7 @@ from sysid.diagnosis.search.folds import shorter_blocks
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.output_error import output_problem
 from sysid.diagnosis.search.output_starts import settled_output
+from sysid.diagnosis.search.presliding import is_dry
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, extended
@@ -245,6 +246,7 @@ def exchanged(
                 if likelihood_gap(best, m, samples) > least
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
+                and not (cause == "coulomb_friction" and is_dry(problem, m))
             ]
             if better:
                 break

@@ -13,6 +13,7 @@ from sysid.diagnosis.search.candidate import (
 )
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import output_starts
+from sysid.diagnosis.search.presliding import is_dry
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
 from sysid.diagnosis.search.starts import many_optima, starts_of
@@ -28,11 +29,14 @@ OFF_PRIOR_PENALTY = 16.0
 
 NESTED = {"coulomb_friction": ("stribeck_friction", "hysteresis")}
 """Effects that become another one at an end of their shape: they contain it, and are no
-alternatives to it."""
+alternatives to it. A hysteresis that is dry friction (`presliding`) ties with it."""
 
 NESTED_SHARE = 0.015
 """Share of a gain that does not decide between an effect and one that contains it: what
 gives in dry friction before it slips is less than an encoder resolves."""
+
+DRY_SHARE = 0.1
+"""The same where readings do not show the range of a hysteresis."""
 
 
 def extended(problem: Problem, model: Model) -> list[Model]:
@@ -151,9 +155,12 @@ def _simplest_first(
         return stage
     samples = problem.samples
     most, best = likelihood_gap(smaller, stage[0], samples), stage[0].effects[-1]
+    dry = best == "hysteresis" and is_dry(problem, stage[0])
 
     def tie(m: Model) -> bool:
         behind = likelihood_gap(m, stage[0], samples)
+        if m.effects[-1] == "coulomb_friction" and dry:
+            return behind < DRY_SHARE * most
         if best not in NESTED.get(m.effects[-1], ()):
             return behind < max(3.0, MODEL_ERROR * most)
         # The model error of large friction is no sign that it falls with speed.
