@@ -22,10 +22,9 @@ from sysid.diagnosis.search.folds import shorter_blocks
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.output_error import output_problem
 from sysid.diagnosis.search.output_starts import settled_output
-from sysid.diagnosis.search.presliding import is_dry
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
-from sysid.diagnosis.search.stage import NESTED_SHARE, extended
+from sysid.diagnosis.search.stage import NESTED_SHARE, deciding_gap, extended
 
 MOST = 3
 """Largest number of causes."""
@@ -239,14 +238,13 @@ def exchanged(
             continue
         for cause, stage in others.items():
             gain = likelihood_gap(without[cause], best, samples)
-            least = max(3.0, NESTED_SHARE * gain)
             better = [
                 m
                 for m in stage
-                if likelihood_gap(best, m, samples) > least
+                if likelihood_gap(best, m, samples)
+                > max(NESTED_SHARE * gain, deciding_gap(problem, cause, m, gain))
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
-                and not (cause == "coulomb_friction" and is_dry(problem, m))
             ]
             if better:
                 break

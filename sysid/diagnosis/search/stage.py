@@ -13,7 +13,7 @@ from sysid.diagnosis.search.candidate import (
 )
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import output_starts
-from sysid.diagnosis.search.presliding import is_dry
+from sysid.diagnosis.search.presliding import DRY_SHARE, is_dry, repeats_friction
 from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
 from sysid.diagnosis.search.starts import many_optima, starts_of
@@ -34,9 +34,6 @@ alternatives to it. A hysteresis that is dry friction (`presliding`) ties with i
 NESTED_SHARE = 0.015
 """Share of a gain that does not decide between an effect and one that contains it: what
 gives in dry friction before it slips is less than an encoder resolves."""
-
-DRY_SHARE = 0.1
-"""The same where readings do not show the range of a hysteresis."""
 
 
 def extended(problem: Problem, model: Model) -> list[Model]:
@@ -151,23 +148,38 @@ def _simplest_first(
     problem: Problem, smaller: Model, stage: list[Model]
 ) -> list[Model]:
     """Puts the effect with the fewest parameters first among those that tie."""
+    stage = [m for m in stage if not repeats_friction(problem, m)]
     if not stage:
         return stage
     samples = problem.samples
-    most, best = likelihood_gap(smaller, stage[0], samples), stage[0].effects[-1]
-    dry = best == "hysteresis" and is_dry(problem, stage[0])
-
-    def tie(m: Model) -> bool:
-        behind = likelihood_gap(m, stage[0], samples)
-        if m.effects[-1] == "coulomb_friction" and dry:
-            return behind < DRY_SHARE * most
-        if best not in NESTED.get(m.effects[-1], ()):
-            return behind < max(3.0, MODEL_ERROR * most)
-        # The model error of large friction is no sign that it falls with speed.
-        return behind < max(3.0, NESTED_SHARE * most)
-
-    tied = [m for m in stage if tie(m)]
+    most = likelihood_gap(smaller, stage[0], samples)
+    tied = [
+        m
+        for m in stage
+        if likelihood_gap(m, stage[0], samples)
+        < deciding_gap(problem, m.effects[-1], stage[0], most)
+    ]
     first = min(
         tied, key=lambda m: (len(problem.space.of(m.effects[-1])), tied.index(m))
     )
     return [first, *(m for m in stage if m is not first)]
+
+
+def deciding_gap(problem: Problem, effect: str, best: Model, gain: float) -> float:
+    """Returns what a model must be ahead of another effect to take its place [nat].
+
+    Args:
+        problem: residuals of a joint.
+        effect: the other, in the place of that which the model adds last.
+        best: the model.
+        gain: log-likelihood gain of the model over that without the effect [nat].
+
+    Source:
+        Ours.
+    """
+    if effect == "coulomb_friction" and is_dry(problem, best):
+        return max(3.0, DRY_SHARE * gain)
+    if best.effects[-1] in NESTED.get(effect, ()):
+        # The model error of large friction is no sign that it falls with speed.
+        return max(3.0, NESTED_SHARE * gain)
+    return max(3.0, MODEL_ERROR * gain)
