@@ -15,6 +15,8 @@ MEMBERS = {
     "weights": (8, 6),
     "steering": (4, 2),
     "steering_walker": (2, 2),
+    "push_effort": (2, 1),
+    "keyboard_creep": (6, 1),
 }
 
 

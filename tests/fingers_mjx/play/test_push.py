@@ -35,14 +35,18 @@ def test_play_sees_and_does_what_the_environment_does(player):
     env = player.env.env
     step, state = jax.jit(env.step), jax.jit(env.reset)(KEY)
     network = player.controller.bundle.network
-    poses = [np.asarray(state.data.qpos)]
+    poses, lags = [np.asarray(state.data.qpos)], []
     for _ in range(STEPS):
         observation = np.asarray(state.obs["state"])
         state = step(state, network(observation))
         poses.append(np.asarray(state.data.qpos))
+        lags.append(np.asarray(state.signals.extra["joint_lag_rad"]))
     played = player.play(KEY, STEPS)
     assert played.held == 0
     np.testing.assert_allclose(played.qpos, np.stack(poses), atol=2e-3)
+    lag = played.trace.extra["joint_lag_rad"]
+    np.testing.assert_allclose(lag, np.stack(lags), atol=2e-3)
+    assert lag[1:].max() > 0.02
     shown = np.asarray(player.controller.observation)
     inputs = slice(368, 440)
     np.testing.assert_allclose(shown[inputs], observation[inputs], atol=2e-3)
