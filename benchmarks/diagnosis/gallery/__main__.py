@@ -27,6 +27,7 @@ from benchmarks.diagnosis.gallery.records import (
 )
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError, one_of
+from fingers_mjx.reports.page import commit_here
 from sysid.diagnosis.diagnose import diagnose
 from sysid.result import Diagnosis
 
@@ -57,6 +58,7 @@ def answer(record: Record, said: Diagnosis) -> dict:
         "summary": said.summary,
         "posterior": [dataclasses.asdict(h) for h in said.posterior],
         "runtime_s": said.runtime_s,
+        "commit": commit_here(),
     }
 
 

@@ -31,7 +31,8 @@ def page(record: Record, row: dict) -> str:
         f"| the authors say | {record.documented} |",
         f"| where | {record.where} |",
         f"| right would be | {', '.join(record.effects)} |",
-        f"| verdict | **{row['verdict']}**, {row['runtime_s']:.0f} s |",
+        f"| verdict | **{row['verdict']}**, {row['runtime_s']:.0f} s, "
+        f"commit {row['commit']} |",
         f"| documented cause in the named set | {'yes' if row['right'] else 'no'} |",
         "",
         row["summary"],
