@@ -1,0 +1,122 @@
+"""The paper's comparative claims, and what our seeds say by a rule fixed before."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fingers_mjx.studies.comparison.results import Results
+from fingers_mjx.studies.statistics.compare import Difference, difference
+from fingers_mjx.studies.statistics.pairs import pair
+
+SEEDS = 12
+"""Of every configuration; before all of them are there, nothing is concluded."""
+
+WALKS_MPS, WALK = 0.05, 10
+"""So many members of `ours` reach this task speed if the budget is not too small."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One difference between two configurations that the paper reports.
+
+    Attributes:
+        text: the claim in words.
+        ours, other: configurations; the difference is ours less other.
+        measure: by name.
+        paper: mean difference with its 95 % interval, in the measure's unit; None where
+            the paper says that there is none.
+    """
+
+    text: str
+    ours: str
+    other: str
+    measure: str
+    paper: tuple[float, float, float] | None
+
+
+SPEED, FIVE, TILT = (
+    "task_speed_mps",
+    "five_finger_participation",
+    "mean_contact_tilt_deg",
+)
+CLAIMS = (
+    Claim(
+        "The footprint objective makes the hand faster",
+        *("ours", "no_footprint", SPEED, (0.0079, 0.0037, 0.0119)),
+    ),
+    Claim(
+        "The footprint objective shifts contact towards the nails",
+        *("ours", "no_footprint", TILT, (8.8, 1.4, 15.9)),
+    ),
+    Claim(
+        "Lift has no effect of its own on speed",
+        *("ours", "no_lift", SPEED, None),
+    ),
+    Claim(
+        "Direction has no effect of its own on speed",
+        *("ours", "no_direction", SPEED, None),
+    ),
+    Claim(
+        "Lift and direction together have none",
+        *("ours", "no_lift_no_direction", SPEED, None),
+    ),
+    Claim(
+        "Without the direction objective more episodes are on five fingers",
+        *("no_direction", "ours", FIVE, (0.31, 0.07, 0.52)),
+    ),
+)
+"""Those of the ablation; source: paper, reward-term ablation in simulation."""
+
+SMALL = {SPEED: 0.0079}
+"""An effect is called none if its interval has zero and nothing as large as this: what
+the paper finds of the footprint."""
+
+
+def measured(claim: Claim, results: Results) -> Difference:
+    """Returns the difference that a claim is about, paired over seeds.
+
+    Args:
+        claim: of two configurations.
+        results: of a sweep that has both.
+    """
+    empty: dict[str, dict[int, float]] = {}
+    ours, other = (
+        results.values.get(name, empty).get(claim.measure, {})
+        for name in (claim.ours, claim.other)
+    )
+    return difference(pair(ours, other))
+
+
+def verdict(claim: Claim, found: Difference, walk: bool) -> str:
+    """Returns "agrees", "disagrees" or why nothing can be said.
+
+    Args:
+        claim: as the paper has it.
+        found: our difference.
+        walk: whether enough members of `ours` walk (`enough_walk`).
+    """
+    if found.n < SEEDS:
+        return f"cannot tell yet: {found.n} of {SEEDS} seeds"
+    if not walk:
+        return "cannot tell: the budget is too small"
+    if found.low is None or found.high is None:
+        return f"cannot tell: {found.note}"
+    sign = int(np.sign(found.low)) if found.low * found.high > 0.0 else 0
+    if claim.paper is None:
+        if sign:
+            return "disagrees"
+        small = max(-found.low, found.high) < SMALL[claim.measure]
+        return "agrees" if small else "cannot tell: the interval is too wide"
+    if not sign:
+        return "cannot tell: the interval has zero"
+    return "agrees" if sign == np.sign(claim.paper[0]) else "disagrees"
+
+
+def enough_walk(results: Results) -> bool:
+    """Whether `WALK` members of `ours` reach `WALKS_MPS`.
+
+    Args:
+        results: of the ablation.
+    """
+    speeds = results.values.get("ours", {}).get(SPEED, {})
+    return sum(speed >= WALKS_MPS for speed in speeds.values()) >= WALK

@@ -1,0 +1,146 @@
+"""Writes the page about the paper's claims from what the sweeps have measured.
+
+python -m benchmarks.claims.claims_page
+"""
+
+from pathlib import Path
+
+from benchmarks.claims.claims import (
+    CLAIMS,
+    FIVE,
+    SEEDS,
+    SPEED,
+    TILT,
+    Claim,
+    enough_walk,
+    measured,
+    verdict,
+)
+from envs.config.atomic_file import write_atomic
+from fingers_mjx.studies.comparison.comparison import compared
+from fingers_mjx.studies.comparison.figures import seed_dots
+from fingers_mjx.studies.comparison.results import Results, read_results
+from fingers_mjx.studies.statistics.compare import Difference
+from fingers_mjx.studies.sweep.manifest import read_manifest
+
+ABLATION = Path("benchmarks/results/ablation")
+PAGE, FIGURE = Path("docs/results/claims.md"), Path("docs/images/ablation.png")
+MEASURES = (SPEED, FIVE, "non_nail_participation", "worst_tip_planting_fraction")
+UNITS = {SPEED: (100.0, "cm/s", 2), FIVE: (1.0, "", 2), TILT: (1.0, "°", 1)}
+"""Factor, unit and digits of a difference."""
+
+UNTRAINED = (
+    ("Ours is faster than tuned stock", "+0.65 (0.26 to 1.02) cm/s"),
+    ("Tuned stock plants on nails more", "in every seed"),
+    ("Ours has more non-nail participation than tuned stock", "+0.35 (0.18 to 0.53)"),
+    (
+        "Doubled footprint plants better than doubled lift",
+        "+0.22 (0.11 to 0.33) of the worst tip",
+    ),
+)
+"""Claims about sweeps that have not been trained: `tuned_stock` and `weights`."""
+
+TEXT = """\
+# The paper's claims
+
+What the paper says about its rewards, tested with our seeds, simulator and budget.
+{first}
+
+| claim | paper | ours, 95 % interval | seeds | |
+|---|---|---|---|---|
+{claims}
+
+**The rule, fixed before.** Differences are paired over seeds, the interval is Student's
+t ([statistics](statistics.md)). Nothing is concluded before {seeds} seeds of both are
+there, nor if fewer than 10 of the 12 of `ours` reach a task speed of 0.05 m/s. Then a
+difference agrees if its interval lies on the paper's side of zero, and disagrees if it
+lies on the other. A claim of no effect disagrees if the interval does not have zero,
+and agrees if it has zero and nothing as large as 0.79 cm/s, the paper's effect of the
+footprint.
+
+## All members so far
+
+{count} of {members} members: 147 M control steps each, 19 % of the paper's 786 M,
+evaluated in 256 randomized episodes of one seed. Dots are seeds, bars their mean and
+its 95 % interval.
+
+![measures of every member](../images/ablation.png)
+
+| configuration | seeds | task speed [m/s] of each | mean |
+|---|---|---|---|
+{arms}
+
+The sweep's directory, less checkpoints, is `benchmarks/results/ablation`; every
+evaluation in it names its commit and seed, and all were trained on NVIDIA H200s. What is
+missing is trained, and this page written, by
+
+```sh
+fingers sweep benchmarks/claims/ablation.yaml -o benchmarks/results/ablation
+fingers compare benchmarks/results/ablation --baseline ours --allow-partial
+python -m benchmarks.claims.claims_page
+```
+"""
+
+
+def page(results: Results) -> str:
+    """Returns the page in Markdown.
+
+    Args:
+        results: of the ablation.
+    """
+    walk = enough_walk(results)
+    found = [(c, measured(c, results)) for c in CLAIMS]
+    said = [(c, d, verdict(c, d, walk)) for c, d in found]
+    said.sort(key=lambda row: not row[2].startswith("disagrees"))
+    against = [c.text for c, _, v in said if v == "disagrees"]
+    first = "No claim is contradicted so far."
+    if against:
+        first = f"**Ours contradicts the paper:** {'; '.join(against)}."
+    rows = [_claim_row(*row) for row in said]
+    rows += [f"| {c} | {p} | not trained yet | 0 | cannot tell |" for c, p in UNTRAINED]
+    return TEXT.format(
+        first=first,
+        claims="\n".join(rows),
+        seeds=SEEDS,
+        count=results.members - len(results.missing),
+        members=results.members,
+        arms="\n".join(_arm_row(results, name) for name in results.configurations),
+    )
+
+
+def _claim_row(claim: Claim, found: Difference, said: str) -> str:
+    paper = "none" if claim.paper is None else _interval(claim.measure, *claim.paper)
+    ours = "–"
+    if found.mean is not None and found.low is not None and found.high is not None:
+        ours = _interval(claim.measure, found.mean, found.low, found.high)
+    pair = f"`{claim.ours}` less `{claim.other}`"
+    return f"| {claim.text} ({pair}) | {paper} | {ours} | {found.n} | {said} |"
+
+
+def _interval(measure: str, mean: float, low: float, high: float) -> str:
+    factor, unit, digits = UNITS[measure]
+    mean, low, high = (factor * x for x in (mean, low, high))
+    text = f"{mean:+.{digits}f} ({low:.{digits}f} to {high:.{digits}f}) {unit}"
+    return text.rstrip().replace("-", "−")
+
+
+def _arm_row(results: Results, name: str) -> str:
+    speeds = results.values.get(name, {}).get(SPEED, {})
+    if not speeds:
+        return f"| `{name}` | none | | |"
+    seeds = sorted(speeds)
+    each = " ".join(f"{speeds[s]:.3f}" for s in seeds).replace("-", "−")
+    mean = sum(speeds.values()) / len(speeds)
+    return f"| `{name}` | {', '.join(map(str, seeds))} | {each} | {mean:.3f} |"
+
+
+def main() -> int:
+    """Writes the page and its figure."""
+    results = read_results(ABLATION, read_manifest(ABLATION))
+    write_atomic(PAGE, page(results))
+    seed_dots(compared(results, "ours", MEASURES)).savefig(FIGURE, dpi=110)
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

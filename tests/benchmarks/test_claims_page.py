@@ -1,0 +1,79 @@
+"""The page about the paper's claims says what was measured, by its rule."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.claims.claims import CLAIMS, SEEDS, WALK, enough_walk, measured, verdict
+from benchmarks.claims.claims_page import ABLATION, PAGE, page
+from fingers_mjx.studies.comparison.results import Results, read_results
+from fingers_mjx.studies.sweep.manifest import read_manifest
+
+FASTER, ALIKE = CLAIMS[0], CLAIMS[2]
+NOISE = 0.004 * np.cos(2.4 * np.arange(SEEDS))
+
+
+def made(gain, claim=FASTER, seeds=SEEDS, speed=0.08) -> Results:
+    """Results in which `ours` is ahead by a gain, with some noise."""
+    ours = dict(enumerate(speed + NOISE[:seeds]))
+    other = {i: v - gain - 0.3 * NOISE[(i + 5) % SEEDS] for i, v in ours.items()}
+    values: Any = {name: {claim.measure: x} for name, x in
+                   ((claim.ours, ours), (claim.other, other))}  # fmt: skip
+    return Results("crawl", tuple(values), values, {}, (), {})
+
+
+def said(gain, claim=FASTER, **given):
+    results = made(gain, claim, **given)
+    return verdict(claim, measured(claim, results), enough_walk(results))
+
+
+def test_the_page_is_what_the_results_say():
+    results = read_results(ABLATION, read_manifest(ABLATION))
+    assert PAGE.read_text("utf-8") == page(results)
+    speeds: Any = results.values["ours"]["task_speed_mps"]
+    speeds[0] += 0.01
+    assert PAGE.read_text("utf-8") != page(results)
+
+
+@pytest.mark.parametrize(
+    ("gain", "answer"),
+    [(0.01, "agrees"), (-0.01, "disagrees"), (0.0, "cannot tell: the interval has")],
+)
+def test_a_difference_is_on_one_side_of_zero(gain, answer):
+    assert said(gain).startswith(answer)
+
+
+def test_no_effect_is_one_that_is_surely_small():
+    assert said(0.0, ALIKE) == "agrees"
+    assert said(0.01, ALIKE) == "disagrees"
+    wide = made(0.0, ALIKE)
+    other: Any = wide.values[ALIKE.other][ALIKE.measure]
+    other.update({i: v + 10 * NOISE[-i] for i, v in other.items()})
+    found = measured(ALIKE, wide)
+    assert verdict(ALIKE, found, True) == "cannot tell: the interval is too wide"
+
+
+def test_nothing_is_said_before_all_seeds_are_there():
+    assert said(0.01, seeds=SEEDS - 1) == "cannot tell yet: 11 of 12 seeds"
+    none = Results("crawl", (), {}, {}, (), {})
+    assert measured(FASTER, none).n == 0
+
+
+def test_nothing_is_said_where_ours_stands():
+    assert said(0.01, speed=0.03) == "cannot tell: the budget is too small"
+    results = made(0.01)
+    ours: Any = results.values["ours"]["task_speed_mps"]
+    ours.update(dict.fromkeys(range(SEEDS - WALK + 1), 0.0))
+    assert not enough_walk(results)
+    ours[0] = 0.06
+    assert enough_walk(results)
+
+
+def test_a_claim_that_is_contradicted_comes_first():
+    results = made(-0.01)
+    text = page(results)
+    assert "**Ours contradicts the paper:** The footprint objective makes" in text
+    assert text.index("disagrees |") < text.index("cannot tell yet")
+    assert not math.isnan(measured(FASTER, results).mean or math.nan)
