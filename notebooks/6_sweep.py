@@ -2,9 +2,10 @@
 # # Reading a sweep: seeds, intervals, and what may be concluded
 #
 # `fingers sweep` trains configurations on several seeds, `fingers compare` says whether
-# they differ. This notebook makes such results by itself, with a difference that is
-# known, so that one can see how often a conclusion from one, three or twelve seeds is
-# right. Nothing is trained here; the statistics are those of `fingers compare`.
+# they differ. This notebook first makes such results by itself, with a difference
+# that is known, so that one can see how often a conclusion from one, three or twelve
+# seeds is right, and then reads a sweep that was trained: the paper's ablation, as far
+# as it is there. Nothing is trained here; the statistics are those of `fingers compare`.
 
 # %%
 import importlib.util
@@ -23,15 +24,22 @@ if importlib.util.find_spec("rewards") is None:  # as in Colab
 
 # %%
 # %matplotlib inline
+from pathlib import Path
+
 import matplotlib as mpl
 import numpy as np
 
+import fingers_mjx
 from fingers_mjx.reports.figures import GREY, INK, LINES, STYLE, panels_of
+from fingers_mjx.studies.comparison.comparison import compared
+from fingers_mjx.studies.comparison.figures import difference_dots, seed_dots
+from fingers_mjx.studies.comparison.results import read_results
 from fingers_mjx.studies.statistics.compare import difference
 from fingers_mjx.studies.statistics.intervals import bca_interval, t_interval
 from fingers_mjx.studies.statistics.pairs import pair
 from fingers_mjx.studies.statistics.power import detectable
 from fingers_mjx.studies.statistics.significance import holm, paired_p
+from fingers_mjx.studies.sweep.manifest import read_manifest
 
 mpl.rcParams.update(STYLE)
 FAST = bool(os.environ.get("NOTEBOOK_FAST"))
@@ -163,6 +171,42 @@ print(
     f"below 0.05: {100 * np.mean(lucky < 0.05):.0f} % of studies, "
     f"{100 * np.mean(corrected < 0.05):.0f} % with the correction"
 )
+figure
+
+# %% [markdown]
+# ## A sweep that was trained
+#
+# `benchmarks/claims/ablation.yaml` takes terms out of the reward of crawling. Each dot
+# is one training of 147 M control steps, evaluated in 256 randomized episodes.
+
+# %%
+TREE = Path(fingers_mjx.__file__).parents[1]
+ABLATION = TREE / "benchmarks/results/ablation"  # in a clone, not in a wheel
+MEASURES = ("task_speed_mps", "five_finger_participation")
+figure = None
+if ABLATION.exists():
+    results = read_results(ABLATION, read_manifest(ABLATION))
+    trained_ones = compared(results, "ours", MEASURES)
+    print(f"{results.members - len(results.missing)} of {results.members} members")
+    figure = seed_dots(trained_ones)
+figure
+
+# %% [markdown]
+# The same as differences from `ours`, on the same seed. An interval that has zero does
+# not show that there is no effect: it shows how large the effect may still be, and that
+# so few seeds do not tell a centimetre per second from nothing.
+
+# %%
+if ABLATION.exists():
+    for row in trained_ones.rows:
+        found = row.difference
+        if row.measure == "task_speed_mps" and found.low is not None:
+            print(
+                f"{row.configuration:22} {100 * found.mean:+5.1f} cm/s "
+                f"[{100 * found.low:+5.1f}, {100 * found.high:+5.1f}], n = {found.n}, "
+                f"p = {row.p_holm:.3f} (Holm), {100 * found.detectable:.1f} detectable"
+            )
+    figure = difference_dots(trained_ones)
 figure
 
 # %% [markdown]
