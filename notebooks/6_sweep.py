@@ -4,8 +4,9 @@
 # `fingers sweep` trains configurations on several seeds, `fingers compare` says whether
 # they differ. This notebook first makes such results by itself, with a difference
 # that is known, so that one can see how often a conclusion from one, three or twelve
-# seeds is right, and then reads a sweep that was trained: the paper's ablation, as far
-# as it is there. Nothing is trained here; the statistics are those of `fingers compare`.
+# seeds is right, and then reads a sweep that was trained: the paper's ablation, as
+# far as it is there. Nothing is trained here; the statistics are those of
+# `fingers compare`.
 
 # %%
 import importlib.util
