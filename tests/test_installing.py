@@ -40,6 +40,11 @@ def extras(text):
     return {*options, *arguments, *",".join(lists).split(",")} - {""}
 
 
+def relative_links(text):
+    """The links and pictures of a text that need files beside it."""
+    return [to for to in re.findall(r"\]\(([^)]+)\)", text) if "://" not in to]
+
+
 def groups(text):
     """The groups of dependencies that a text installs or leaves out."""
     return set(re.findall(r"--(?:no-|only-)?group[ =](\w+)", text))
@@ -71,6 +76,15 @@ def test_what_does_not_exist_would_be_seen(text, found):
     assert extras('pip install ./deploy ".[c]" "fingers-mjx[d] @ e"') == {"c", "d"}
     assert groups("uv sync --group a --no-group b") == {"a", "b"}
     assert not UNPUBLISHED.search('pip install "fingers-deploy @ a" ./deploy')
+
+
+@pytest.mark.parametrize("folder", [ROOT, ROOT / "deploy"], ids=["all", "deploy"])
+def test_what_a_package_index_shows_leads_nowhere_else(folder):
+    """An index has no files beside the description, so relative links are dead."""
+    project = tomllib.loads((folder / "pyproject.toml").read_text("utf-8"))["project"]
+    text = (folder / project["readme"]).read_text("utf-8")
+    assert len(text) > 1000 and relative_links(text) == []
+    assert relative_links((ROOT / "README.md").read_text("utf-8"))  # would be seen
 
 
 @pytest.mark.parametrize("path", IMAGES, ids=name)
