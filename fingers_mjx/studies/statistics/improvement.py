@@ -7,7 +7,7 @@ from jaxtyping import Float
 def probability_of_improvement(
     ours: Float[np.ndarray, " n"], other: Float[np.ndarray, " m"]
 ) -> float:
-    """P = Σ_i Σ_j ([x_i > y_j] + ½ [x_i = y_j]) / (n m) ∈ [0, 1] [1].
+    """P = Σ_i Σ_j ([x_i > y_j] + ½ [x_i = y_j]) / (n m), from 0 to 1 [1].
 
     Chance that a training of our arm, with any seed, is above one of the other arm with
     any seed: all pairs of seeds count, not only equal seeds. ½ is no difference; it is
