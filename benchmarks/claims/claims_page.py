@@ -71,7 +71,7 @@ its 95 % interval.
 {arms}
 
 The sweep's directory, less checkpoints, is `benchmarks/results/ablation`; every
-evaluation in it names its commit and seed, and all were trained on NVIDIA H200s. What is
+evaluation names its commit and seed, and all were trained on NVIDIA H200s. What is
 missing is trained, and this page written, by
 
 ```sh

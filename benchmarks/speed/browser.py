@@ -29,6 +29,15 @@ _CLICK = """(text => {
     if (hit.length) hit[hit.length - 1].click();
     return hit.length > 0;
 })(%s)"""
+_FOCUS = """(text => {
+    const after = (a, b) => a.compareDocumentPosition(b) & 4;
+    const said = [...document.querySelectorAll('label,span,p,div')]
+        .filter(e => e.innerText && e.innerText.trim() === text).pop();
+    const sliders = [...document.querySelectorAll('[role=slider]')];
+    const hit = said && sliders.find(e => after(said, e));
+    if (hit) hit.focus();
+    return !!hit && document.activeElement === hit;
+})(%s)"""
 
 
 def browser_path() -> str | None:
@@ -84,6 +93,13 @@ class Tab:
     def click(self, text: str) -> None:
         """Clicks the innermost element with exactly this text."""
         assert self.value(_CLICK % json.dumps(text)), f"nothing says {text!r}"
+
+    def slide(self, label: str, key: str, times: int = 1) -> None:
+        """Presses a key, such as `ArrowRight`, at the slider after a label."""
+        assert self.value(_FOCUS % json.dumps(label)), f"no slider {label!r}"
+        for _ in range(times):
+            for kind in ("keyDown", "keyUp"):
+                self.call("Input.dispatchKeyEvent", type=kind, key=key, code=key)
 
     def picture(self) -> bytes:
         """Returns a picture of the page as PNG."""

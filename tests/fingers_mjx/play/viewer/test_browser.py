@@ -1,49 +1,121 @@
 """The page in a real browser: it draws, its knobs reach the simulation, no errors."""
 
+import dataclasses
 import io
 import threading
+import time
+from contextlib import contextmanager
 
 import numpy as np
 import pytest
 from PIL import Image
+from support.cli_setup import default_hand
 from support.free_port import free_port
 
 from benchmarks.speed.browser import browser_path, opened
+from envs.hand.stance import stance_of
+from fingers_mjx.play.viewer.live import Live
 from fingers_mjx.play.viewer.watch import watch
+from sysid.logs.log import make_log
 
 pytestmark = pytest.mark.skipif(
     browser_path() is None, reason="no Chromium or Chrome is installed"
 )
 
 
-@pytest.fixture
-def address(watched):
-    """The page, running in a thread until the test is over."""
+@contextmanager
+def page_of(watched):
+    """The page, running in a thread, in a browser."""
     port, over = free_port(), threading.Event()
     page = threading.Thread(
         target=watch, args=(watched, port, lambda: not over.is_set())
     )
     page.start()
-    yield f"http://127.0.0.1:{port}"
-    over.set()
-    page.join(60)
+    try:
+        with opened(f"http://127.0.0.1:{port}") as tab:
+            tab.wait_for("running,")
+            yield tab
+    finally:
+        over.set()
+        page.join(60)
 
 
-def test_a_person_sees_a_hand_that_moves_and_can_stop_it(address):
-    with opened(address) as tab:
-        tab.wait_for("running,")
+@pytest.fixture
+def wished(monkeypatch):
+    """What the simulation was asked for, step by step."""
+    asked, step = [], Live.step
+
+    def spy(self, wishes):
+        asked.append(wishes)
+        return step(self, wishes)
+
+    monkeypatch.setattr(Live, "step", spy)
+    return asked
+
+
+def until(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "it does not happen"
+        time.sleep(0.1)
+
+
+def pixels(shot):
+    return np.asarray(Image.open(io.BytesIO(shot)))[..., :3].astype(int)
+
+
+def test_a_person_sees_a_hand_that_moves_and_can_stop_it(watched):
+    with page_of(watched) as tab:
         for text in ("forward [m/s]", "contact forces", "thumb", "mm/s"):
             tab.wait_for(text)
-        tab.click("Effects of the drive")
-        tab.wait_for("deadband")
         tab.click("pause")
         tab.wait_for("paused")
         shot = tab.picture()
         assert tab.errors == []
-    picture = np.asarray(Image.open(io.BytesIO(shot)))
-    middle = picture[250:500, 450:950, :3].astype(int)
+    middle = pixels(shot)[250:500, 450:950]
     colourful = middle.max(axis=2) - middle.min(axis=2) > 80
     assert colourful.sum() > 300, "no finger is to be seen in the middle"
     red, green, blue = np.moveaxis(middle, 2, 0)
     force = (red - green > 90) & (green < 60) & (blue > green)
     assert force.sum() > 150, "no contact force is to be seen"
+
+
+def test_knobs_reach_the_simulation(watched, wished):
+    with page_of(watched) as tab:
+        before = wished[-1]
+        assert "deadband" not in before.effects
+        tab.slide("forward [m/s]", "ArrowRight", 4)
+        until(lambda: wished[-1].command[0] > before.command[0])
+        tab.slide("turn [rad/s]", "ArrowLeft", 4)
+        until(lambda: wished[-1].command[2] < before.command[2])
+        tab.click("left")
+        until(lambda: any(w.push == "left" for w in wished))
+        tab.click("Effects of the drive")
+        tab.click("deadband")
+        until(lambda: "deadband" in wished[-1].effects)
+        tab.wait_for("running,")
+        assert tab.errors == []
+    assert sum(w.push is not None for w in wished) == 1
+
+
+def test_a_measured_log_stands_beside_the_hand(watched):
+    hand = default_hand()
+    stance, t_s = stance_of(hand), 0.02 * np.arange(500)
+    columns = {
+        f"{kind}.{name}": np.full(len(t_s), value)
+        for name, value in zip(
+            hand.nominal.joint_names, stance.joint_pos_rad, strict=True
+        )
+        for kind in ("cmd", "pos")
+    }
+    log = make_log(hand.nominal.joint_names, t_s, columns, source="walk.csv")
+    shots = []
+    for log_or_none in (log, None):
+        with page_of(dataclasses.replace(watched, log=log_or_none)) as tab:
+            if log_or_none is not None:
+                tab.wait_for("measured: walk.csv")
+            tab.click("pause")
+            tab.wait_for("paused")
+            shots.append(pixels(tab.picture())[100:600, 300:1000])
+    blue = [(s[..., 2] - s[..., 0] > 60).sum() for s in shots]
+    assert blue[0] > 1.5 * blue[1] + 300, "no second hand is to be seen"
