@@ -16,6 +16,9 @@ control frame V, `_w` the world.
 `jax.vmap` over the signals evaluates many hands.
 """
 
+from importlib.util import find_spec
+from pathlib import Path
+
 from rewards.airtime import (
     AirTimeMemory,
     AirTimeParams,
@@ -154,3 +157,14 @@ __all__ = [
     "vertical_velocity",
     "weights_at",
 ]
+
+_HERE = Path(__file__).resolve().parents[1]
+for _name in ("rewards", "envs", "sysid"):  # common names, of which there may be others
+    _spec = find_spec(_name)
+    _origin = _spec and _spec.origin
+    if _origin and Path(_origin).resolve().parent != _HERE / _name:
+        raise ImportError(
+            f"package {_name}: found {_origin}; valid: {_HERE / _name}, so install "
+            "fingers-mjx into an environment of its own and run it from a directory "
+            f"without {_name}"
+        )

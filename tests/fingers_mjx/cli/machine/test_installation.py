@@ -8,6 +8,7 @@ import os
 import shutil
 import subprocess
 import sys
+import sysconfig
 import tomllib
 from importlib import metadata
 from pathlib import Path
@@ -175,11 +176,14 @@ def test_foreign_package_in_our_place_is_reported(tmp_path, name, kind):
     assert f"package {name}: found {place}" in done.stderr
 
 
+COMMON = ("rewards", "envs", "sysid")
+
+
 @pytest.mark.parametrize(
     ("foreign", "imported"),
-    [("rewards", "envs"), ("rewards", "sysid"), ("envs", "sysid.logs.read")],
+    [*itertools.permutations(COMMON, 2), ("envs", "sysid.logs.read")],
 )
-def test_importing_what_needs_a_foreign_package_is_the_same_sentence(
+def test_importing_ours_beside_a_foreign_package_is_the_same_sentence(
     tmp_path, foreign, imported
 ):
     (tmp_path / foreign).mkdir()
@@ -202,6 +206,21 @@ def test_importing_what_needs_a_foreign_package_is_the_same_sentence(
     assert last.startswith(f"ImportError: package {foreign}: found {tmp_path}")
     assert f"run it from a directory without {foreign}" in last
     assert imports(str(ROOT), str(ROOT / "deploy")).returncode == 0
+
+
+def test_rewards_alone_need_none_of_the_others(tmp_path):
+    """Refused is what is foreign, not what is absent; -S leaves the checkout out."""
+    shutil.copytree(ROOT / "rewards", tmp_path / "rewards")
+    done = subprocess.run(
+        [sys.executable, "-S", "-c", "import rewards; print(rewards); import envs"],
+        cwd=tmp_path,
+        env=os.environ | {"PYTHONPATH": sysconfig.get_path("purelib")},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert str(tmp_path) in done.stdout
+    assert done.stderr.endswith("ModuleNotFoundError: No module named 'envs'\n")
 
 
 def test_our_own_packages_are_in_their_place():
