@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
-from scipy.stats import bootstrap, ttest_1samp
+from scipy.stats import bootstrap, norm, ttest_1samp
 
 from fingers_mjx.studies.statistics.intervals import (
     RESAMPLES,
     bca_interval,
+    expanded,
     interquartile_mean,
     t_interval,
 )
@@ -19,12 +20,46 @@ def test_t_interval_is_scipys():
     assert known[0] < narrow[0] < narrow[1] < known[1]
 
 
-def test_bca_interval_is_scipys():
-    known = bootstrap(
-        (VALUES,), np.mean, n_resamples=RESAMPLES, rng=np.random.default_rng(5)
-    ).confidence_interval
+def test_bca_interval_is_scipys_at_the_expanded_level():
+    """Negative control: at the level that is asked for it is much narrower."""
+    known, narrow = (
+        bootstrap(
+            (VALUES,),
+            np.mean,
+            confidence_level=level,
+            n_resamples=RESAMPLES,
+            rng=np.random.default_rng(5),
+        ).confidence_interval
+        for level in (expanded(0.95, len(VALUES)), 0.95)
+    )
     width = known.high - known.low
     np.testing.assert_allclose(bca_interval(VALUES), known, atol=0.05 * width)
+    assert narrow.high - narrow.low < 0.85 * width
+
+
+@pytest.mark.parametrize("n", [3, 5, 12, 1000])
+def test_expanded_percentiles_of_normal_resamples_are_students_interval(n):
+    """Resamples of the mean have the standard deviation s √((n-1)/n) / √n."""
+    values = np.random.default_rng(n).normal(size=n)
+    spread = values.std() / np.sqrt(n)
+    tail = (1 - expanded(0.95, n)) / 2
+    ends = values.mean() + spread * norm.ppf([tail, 1 - tail])
+    np.testing.assert_allclose(ends, t_interval(values), rtol=1e-6)
+
+
+def test_expansion_vanishes_with_many_values():
+    levels = [expanded(0.95, n) for n in (3, 5, 12, 100, 10**6)]
+    assert (np.diff(levels) < 0).all()
+    np.testing.assert_allclose(levels[-1], 0.95, atol=1e-5)
+
+
+def test_no_end_of_a_bootstrap_is_beyond_the_values():
+    """Student's interval of three seeds, as the negative control, is far beyond."""
+    studies = np.random.default_rng(0).normal(size=(50, 3))
+    low, high = bca_interval(studies)
+    lowest, highest = studies.min(axis=-1), studies.max(axis=-1)
+    assert ((lowest - 1e-12 <= low) & (high <= highest + 1e-12)).all()
+    assert (t_interval(studies)[0] < lowest).mean() > 0.9
 
 
 def test_intervals_move_and_scale_with_the_values():
