@@ -16,6 +16,7 @@ control frame V, `_w` the world.
 `jax.vmap` over the signals evaluates many hands.
 """
 
+import warnings
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -159,12 +160,14 @@ __all__ = [
 ]
 
 _HERE = Path(__file__).resolve().parents[1]
-for _name in ("rewards", "envs", "sysid"):  # common names, of which there may be others
+for _name in ("envs", "sysid"):  # common names, of which there may be others
     _spec = find_spec(_name)
     _origin = _spec and _spec.origin
     if _origin and Path(_origin).resolve().parent != _HERE / _name:
-        raise ImportError(
+        # Nothing here needs it, so a project with a package of that name goes on.
+        warnings.warn(
             f"package {_name}: found {_origin}; valid: {_HERE / _name}, so install "
             "fingers-mjx into an environment of its own and run it from a directory "
-            f"without {_name}"
+            f"without {_name}",
+            stacklevel=2,
         )

@@ -4,7 +4,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 _HERE = Path(__file__).resolve().parents[1]
-for _name in ("rewards", "envs", "sysid"):  # common names, of which there may be others
+for _name in ("rewards", "envs"):  # common names, of which there may be others
     _spec = find_spec(_name)
     _origin = _spec and _spec.origin
     if _origin and Path(_origin).resolve().parent != _HERE / _name:

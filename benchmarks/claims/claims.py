@@ -96,19 +96,19 @@ def verdict(claim: Claim, found: Difference, walk: bool) -> str:
         walk: whether enough members of `ours` walk (`enough_walk`).
     """
     if found.n < SEEDS:
-        return f"cannot tell yet: {found.n} of {SEEDS} seeds"
+        return f"not yet: {found.n} of {SEEDS} seeds"
     if not walk:
-        return "cannot tell: the budget is too small"
+        return "open: the budget is too small"
     if found.low is None or found.high is None:
-        return f"cannot tell: {found.note}"
+        return f"open: {found.note}"
     sign = int(np.sign(found.low)) if found.low * found.high > 0.0 else 0
     if claim.paper is None:
         if sign:
             return "disagrees"
         small = max(-found.low, found.high) < SMALL[claim.measure]
-        return "agrees" if small else "cannot tell: the interval is too wide"
+        return "agrees" if small else "open: the interval is too wide"
     if not sign:
-        return "cannot tell: the interval has zero"
+        return "open: the interval has zero"
     return "agrees" if sign == np.sign(claim.paper[0]) else "disagrees"
 
 

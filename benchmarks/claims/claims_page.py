@@ -97,7 +97,7 @@ def page(results: Results) -> str:
     if against:
         first = f"**Ours contradicts the paper:** {'; '.join(against)}."
     rows = [_claim_row(*row) for row in said]
-    rows += [f"| {c} | {p} | not trained yet | 0 | cannot tell |" for c, p in UNTRAINED]
+    rows += [f"| {c} | {p} | not trained yet | 0 | not yet |" for c, p in UNTRAINED]
     return TEXT.format(
         first=first,
         claims="\n".join(rows),

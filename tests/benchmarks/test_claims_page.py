@@ -39,7 +39,7 @@ def test_the_page_is_what_the_results_say():
 
 @pytest.mark.parametrize(
     ("gain", "answer"),
-    [(0.01, "agrees"), (-0.01, "disagrees"), (0.0, "cannot tell: the interval has")],
+    [(0.01, "agrees"), (-0.01, "disagrees"), (0.0, "open: the interval has")],
 )
 def test_a_difference_is_on_one_side_of_zero(gain, answer):
     assert said(gain).startswith(answer)
@@ -52,17 +52,17 @@ def test_no_effect_is_one_that_is_surely_small():
     other: Any = wide.values[ALIKE.other][ALIKE.measure]
     other.update({i: v + 10 * NOISE[-i] for i, v in other.items()})
     found = measured(ALIKE, wide)
-    assert verdict(ALIKE, found, True) == "cannot tell: the interval is too wide"
+    assert verdict(ALIKE, found, True) == "open: the interval is too wide"
 
 
 def test_nothing_is_said_before_all_seeds_are_there():
-    assert said(0.01, seeds=SEEDS - 1) == "cannot tell yet: 11 of 12 seeds"
+    assert said(0.01, seeds=SEEDS - 1) == "not yet: 11 of 12 seeds"
     none = Results("crawl", (), {}, {}, (), {})
     assert measured(FASTER, none).n == 0
 
 
 def test_nothing_is_said_where_ours_stands():
-    assert said(0.01, speed=0.03) == "cannot tell: the budget is too small"
+    assert said(0.01, speed=0.03) == "open: the budget is too small"
     results = made(0.01)
     ours: Any = results.values["ours"]["task_speed_mps"]
     ours.update(dict.fromkeys(range(SEEDS - WALK + 1), 0.0))
@@ -75,5 +75,5 @@ def test_a_claim_that_is_contradicted_comes_first():
     results = made(-0.01)
     text = page(results)
     assert "**Ours contradicts the paper:** The footprint objective makes" in text
-    assert text.index("disagrees |") < text.index("cannot tell yet")
+    assert text.index("disagrees |") < text.index("not yet")
     assert not math.isnan(measured(FASTER, results).mean or math.nan)
