@@ -129,8 +129,9 @@ figure
 # ## Does an interval hold what it says?
 #
 # A 95 % interval should hold the truth in 95 of 100 studies. Student's does, at three
-# seeds too. A bootstrap knows only the few values that it resamples and is too sure of
-# them: `fingers compare` prints both and puts Student's first.
+# seeds too. A bootstrap never goes beyond the few values that it resamples: three seeds
+# are too few for it, also with levels that are widened for small samples.
+# `fingers compare` prints both and puts Student's first.
 
 # %%
 few = (3, 5, 8, 12)
@@ -181,7 +182,7 @@ figure
 # is one training of 147 M control steps, evaluated in 256 randomized episodes.
 
 # %%
-TREE = Path(fingers_mjx.__file__).parents[1]
+TREE = Path(fingers_mjx.__file__).parent.parent
 ABLATION = TREE / "benchmarks/results/ablation"  # in a clone, not in a wheel
 MEASURES = ("task_speed_mps", "five_finger_participation")
 figure = None
@@ -195,7 +196,7 @@ figure
 # %% [markdown]
 # The same as differences from `ours`, on the same seed. An interval that has zero does
 # not show that there is no effect: it shows how large the effect may still be, and that
-# so few seeds do not tell a centimetre per second from nothing.
+# so few seeds do not separate a centimetre per second from nothing.
 
 # %%
 if ABLATION.exists():
