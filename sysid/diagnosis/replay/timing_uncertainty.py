@@ -3,9 +3,12 @@
 Both make a residual uncertain where much happens at once: its samples count less there.
 """
 
+import math
+
 import numpy as np
 from jaxtyping import Float
 
+from sysid.diagnosis.replay.band import TAPS
 from sysid.drive import JointDrive
 
 SAMPLING = 0.15
@@ -14,6 +17,9 @@ SAMPLING = 0.15
 CYCLE_S = 2e-4
 """Standard deviation of the time at which a target is taken: a servo of 1 kHz looks
 for a new one every millisecond [s]."""
+
+FADED = 8.0
+"""Time constants after which a change counts no more [1]."""
 
 
 def sampling_uncertainty(
@@ -49,9 +55,11 @@ def timing_uncertainty(
     A target that is taken Δ later moves the command by Δ ċ. The changes δ_i of the
     target are taken at times of their own, so
 
-        σ² = (kp Δ)² Σ_i (δ_i ω e^{−ω (t − t_i)})²
+        σ² = (kp Δ)² Σ_i (δ_i r(t − t_i))²,   r = w ∗ a,   a_k = (1 − λ) λᵏ / h
 
-    behind a low-pass of cutoff ω, and at most kp Δ v where the speed is limited to v.
+    behind a low-pass of cutoff ω, λ = e^{−ω h}, at steps k of length h, and the band w
+    of the residuals, which spreads a change to the samples before it; and at most
+    kp Δ v where the speed is limited to v.
 
     Args:
         cmd: target at the steps of the grid [rad].
@@ -68,13 +76,15 @@ def timing_uncertainty(
     """
     cutoff = drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
     speed = drive.parameter("slew_limit", "speed_rad_s", np.inf)
-    omega = min(2.0 * np.pi * cutoff, 0.5 / dt)
+    decay = 2.0 * np.pi * cutoff * dt
     change = np.diff(cmd, axis=0, prepend=cmd[:1]) ** 2
     lag = round(drive.parameter("transport_delay", "delay_s", 0.0) / dt)
     change = np.concatenate([np.zeros((lag, cmd.shape[1])), change])[: len(cmd)]
-    total, rate = np.zeros(cmd.shape[1]), np.zeros_like(cmd)
-    for k, added in enumerate(change):
-        total = total * np.exp(-2.0 * omega * dt) + added
-        rate[k] = omega * np.sqrt(total)
+    steps = np.arange(min(len(cmd), 1 + math.ceil(FADED / decay)))
+    filtered = -np.expm1(-decay) / dt * np.exp(-decay) ** steps
+    response = np.convolve(TAPS, filtered) ** 2
+    first = len(TAPS) // 2
+    spread = [np.convolve(x, response)[first : first + len(cmd)] for x in change.T]
+    rate = np.sqrt(np.stack(spread, 1))
     rate = np.where(np.abs(vel) > 0.8 * speed, speed, np.minimum(rate, speed))
     return kp * CYCLE_S * rate

@@ -95,6 +95,10 @@ def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:
     return timing_error(slot, u, data)
 
 
+SPEEDS = ("speed_rad_s", "up_rad_s", "down_rad_s")
+"""Limits of a speed, also by direction."""
+
+
 def timing_error(slot: Slot, u: float, data: JointTrack) -> float:
     """Standard error of a coordinate by a servo's cycle, in units of its scale [1].
 
@@ -124,7 +128,7 @@ def timing_error(slot: Slot, u: float, data: JointTrack) -> float:
         return CYCLE_S * max(slot.scale / data.speed_scale, whole)
     ways = {
         "cutoff_hz": 2.0 * math.pi,
-        "speed_rad_s": 2.0 / data.angle_scale,
+        **dict.fromkeys(SPEEDS, 2.0 / data.angle_scale),
         "slope_nm_s": 1.0 / data.torque_scale,
     }
     return CYCLE_S * slot.scale * ways.get(slot.name, 0.0)

@@ -48,24 +48,34 @@ def test_repeats_say_what_is_noise_and_friction_need_not(monkeypatch):
     assert friction_accepted(monkeypatch, 0.8, LEAVES * 0.05, repeat=True)
 
 
-@pytest.mark.parametrize(("limit", "taken"), [(30_000.0, False), (3_000.0, True)])
-def test_a_time_within_a_servos_cycle_is_no_cause(monkeypatch, limit, taken):
-    """At 3 rad/s limits of an acceleration last 0.1 and 1 ms; both have a gain."""
+@pytest.mark.parametrize(
+    ("effect", "names", "limit", "taken"),
+    [
+        ("acceleration_limit", ("acceleration_rad_s2",), 30_000.0, False),
+        ("acceleration_limit", ("acceleration_rad_s2",), 3_000.0, True),
+        ("directional_slew", ("up_rad_s", "down_rad_s"), 5_000.0, False),
+        ("directional_slew", ("up_rad_s", "down_rad_s"), 300.0, True),
+    ],
+)
+def test_a_time_within_a_servos_cycle_is_no_cause(
+    monkeypatch, effect, names, limit, taken
+):
+    """At 3 rad/s limits of an acceleration last 0.1 and 1 ms, speeds 0.2 and 3 ms."""
     monkeypatch.setattr(selection, "log_likelihood_gain", lambda *_: 1e4)
-    slot = Slot("acceleration_limit", "acceleration_rad_s2", "rad/s²", "reciprocal",
-                30.0, 0.0, 0.0, 2.0, 0.0, (), True)  # fmt: skip
+    slots = [
+        Slot(effect, name, "", "reciprocal", 30.0, 0.0, 0.0, 2.0, 0.0, (), True)
+        for name in names
+    ]
     problem = SimpleNamespace(
-        space=Space((slot,)),
+        space=Space(tuple(slots)),
         samples=200,
-        data=SimpleNamespace(speed_scale=3.0, angle_scale=1.0),
+        data=SimpleNamespace(speed_scale=3.0, angle_scale=1.0, torque_scale=1.0),
         channel_counts=lambda: np.array([100, 100]),
     )
+    found = SimpleNamespace(theta=np.full(len(slots), 30.0 / limit))
     models = [
         SimpleNamespace(effects=e, errors=np.array([1.0, x]), penalty=0.0, fit=fit)
-        for e, x, fit in (
-            ((), 100.0, None),
-            ((slot.effect,), 1.0, SimpleNamespace(theta=np.array([30.0 / limit]))),
-        )
+        for e, x, fit in (((), 100.0, None), ((effect,), 1.0, found))
     ]
     assert accepted(problem, *models, models[0]) == taken
 
