@@ -52,6 +52,11 @@ def sweep(**changes):
     return from_dict(Sweep, written(**changes), "spec.yaml")
 
 
+def pretend_warp(monkeypatch):
+    """Lets a sweep be one on Warp, which need not be installed to pretend trainings."""
+    monkeypatch.setattr("fingers_mjx.studies.sweep.check.find_spec", lambda name: name)
+
+
 def plan_faults(root, faults):
     """Lets members fail: which fault in which of their attempts."""
     planned(root).write_text(json.dumps(faults), "utf-8")

@@ -28,7 +28,8 @@ class Book:
     """Rows of all members.
 
     What a killed sweep had running waits again, and so does what failed: a new start of
-    the sweep tries it again. What is done stays done, if its evaluation is there.
+    the sweep tries it again. What is done stays done, if its evaluation is there, and
+    what has diverged stays so.
 
     Args:
         spec: resolved.
@@ -87,7 +88,7 @@ class Book:
         else:
             self._failures[key] += 1
             again = self._failures[key] <= RETRIES
-            state = "waiting" if again else "failed"
+            state = "waiting" if again else found.at_last
             self._change(member, state=state, reason=found.reason)
 
     def member(self, key: Key) -> Member:

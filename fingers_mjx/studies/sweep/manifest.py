@@ -26,7 +26,8 @@ class Member:
     Attributes:
         configuration: its name.
         seed: of its trainings.
-        state: "diverged" is not trained again: the same seed diverges again.
+        state: "diverged" is not trained again: the same seed diverges again, or has
+            done so on Warp.
         reason: why it failed or diverged; of a member that waits, why it does again.
         attempts: how often it was started.
         stage: the one reached.

@@ -12,6 +12,7 @@ from envs.config.json_file import read_table
 from envs.errors import BAD_INPUT, InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.runs.files import OutOfSpace
+from fingers_mjx.studies.sweep.manifest import State
 from fingers_mjx.studies.sweep.plan import LOG_FILE, Key
 from fingers_mjx.training.errors import Diverged, Interrupted
 
@@ -31,10 +32,12 @@ class Outcome:
         verdict: "again" is a failure that another attempt may not have; "failed" one
             that it would have again.
         reason: in one sentence; empty if it is done.
+        at_last: state of a member that has had its last attempt after "again".
     """
 
     verdict: Verdict
     reason: str = ""
+    at_last: State = "failed"
 
 
 def is_evaluated(run: Path) -> bool:
@@ -53,7 +56,9 @@ def forget_outcome(root: Path, key: Key) -> None:
     (key.directory(root) / OUTCOME_FILE).unlink(missing_ok=True)
 
 
-def outcome(root: Path, key: Key, run: Path, status: int) -> Outcome:
+def outcome(
+    root: Path, key: Key, run: Path, status: int, repeatable: bool = True
+) -> Outcome:
     """Returns what became of a member.
 
     Args:
@@ -61,11 +66,15 @@ def outcome(root: Path, key: Key, run: Path, status: int) -> Outcome:
         key: the member.
         run: its last run directory.
         status: exit status of its worker; negative if a signal ended it.
+        repeatable: whether the same seed gives the same training, as it does on the
+            CPU: then one that diverged would do so again.
     """
     if is_evaluated(run):
         return Outcome("done")
     noted = _noted(key.directory(root) / OUTCOME_FILE)
     status, reason = noted.get("status", status), noted.get("reason", "")
+    if status == Diverged.exit_code and not repeatable:
+        return Outcome("again", reason, at_last="diverged")
     if status == Diverged.exit_code:
         return Outcome("diverged", f"{reason}; the same seed would diverge again")
     if status == BAD_INPUT:

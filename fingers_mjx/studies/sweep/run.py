@@ -142,7 +142,7 @@ def _note_ended(book: Book, running: _Running) -> None:
         running.jobs.remove((group, job))
         for key in group:
             run = book.root / book.member(key).run
-            found = outcome(book.root, key, run, status)
+            found = outcome(book.root, key, run, status, book.spec.repeatable)
             book.ended(key, found, running.stopping)
             if found.verdict == "full":
                 running.full = found.reason

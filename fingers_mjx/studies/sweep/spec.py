@@ -151,6 +151,11 @@ class Sweep:
         for place, overrides in places.items():
             _check_words(place, overrides, hand=place.startswith("configurations."))
 
+    @property
+    def repeatable(self) -> bool:
+        """Whether a seed always trains the same: Warp's sums have no fixed order."""
+        return self.backend != "warp"
+
 
 def seed_list(seeds: Seeds, after: int = -1) -> tuple[int, ...]:
     """Returns a list of seeds as it is, or so many of them after a number."""

@@ -15,6 +15,7 @@ from fingers_mjx.studies.sweep.engines.held import gpu_facts
 from fingers_mjx.studies.sweep.engines.process import WORKER
 from fingers_mjx.studies.sweep.plan import Key, Training, keys, trainings
 from fingers_mjx.studies.sweep.spec import Sweep
+from fingers_mjx.training.member import END_FILE
 from fingers_mjx.training.population import program
 
 WORLDS_PER_GIB = 256
@@ -87,8 +88,24 @@ def shared(stages: Sequence[Training]) -> str:
     return json.dumps(found, sort_keys=True)
 
 
+def begins_again(spec: Sweep, run: Path) -> bool:
+    """Whether a stage that diverged is trained anew, from where it began.
+
+    Its last checkpoint may be on the way there already: only another training, which
+    Warp gives with the same seed, shows whether the settings are to blame.
+
+    Args:
+        spec: resolved.
+        run: directory of the stage.
+    """
+    return not spec.repeatable and (run / END_FILE).exists()
+
+
 def _reached(spec: Sweep, root: Path, key: Key) -> list[int]:
-    """Returns the iterations that each stage of a member has saved."""
-    home = key.directory(root)
-    found = [checkpoint.checkpoints(home / s.name / "checkpoints") for s in spec.stages]
+    """Returns the iterations that each stage of a member goes on from, -1 if afresh."""
+    runs = [key.directory(root) / stage.name for stage in spec.stages]
+    found = [
+        [] if begins_again(spec, run) else checkpoint.checkpoints(run / "checkpoints")
+        for run in runs
+    ]
     return [int(saved[-1].name) if saved else -1 for saved in found]

@@ -8,8 +8,16 @@ from support.sweep_setup import TINY, sweep
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.runs.directory import CONFIG_FILE
 from fingers_mjx.studies.sweep import member
-from fingers_mjx.studies.sweep.member import evaluate_members, start_of
+from fingers_mjx.studies.sweep.member import (
+    ASIDE,
+    evaluate_members,
+    start_of,
+    train_members,
+)
 from fingers_mjx.studies.sweep.plan import Key, trainings
+from fingers_mjx.studies.sweep.spec import NAME
+from fingers_mjx.training.member import END_FILE
+from fingers_mjx.training.start import Start
 
 
 @pytest.fixture
@@ -43,6 +51,34 @@ def test_killed_before_its_settings_were_written_it_begins_again(stage, tmp_path
     start = start_of(stage, tmp_path / "before")
     assert not start.resume and start.warm_start == tmp_path / "before"
     assert not stage.path.exists()
+
+
+@pytest.mark.parametrize("backend", ["warp", "cpu"])
+def test_a_stage_that_diverged_begins_again_on_warp(tmp_path, monkeypatch, backend):
+    """Not what was before it; negative control: on the CPU it goes on as it was."""
+    stages = [{"name": "walk"}, {"name": "adapt", "schedules": "keep"}]
+    spec, key = sweep(backend=backend, stages=stages), Key("plain", 0)
+    walk, adapt = trainings(spec, tmp_path, key)
+    for stage, iteration in ((walk, walk.setup.train.iterations), (adapt, 1)):
+        (stage.path / "checkpoints").mkdir(parents=True)
+        saved(stage, iteration)
+    (adapt.path / END_FILE).touch()
+    begun = []
+
+    def train(group, on_progress):
+        begun.extend((one.run_dir, one.start) for one in group.values())
+        return {}
+
+    monkeypatch.setattr(member, "_train", train)
+    train_members(spec, tmp_path, [key], lambda event: None)
+    afresh = Start(warm_start=walk.path, keep_schedules=True)
+    [(path, start)] = begun
+    assert path == adapt.path
+    assert start == (afresh if backend == "warp" else Start(resume=True))
+    aside = adapt.path.with_name("adapt" + ASIDE)
+    assert (aside / END_FILE).exists() == (backend == "warp")
+    assert adapt.path.exists() == (backend == "cpu")
+    assert not NAME.fullmatch(aside.name)  # no stage is called that
 
 
 def test_an_evaluation_has_the_room_that_the_sweep_has_now(tmp_path, monkeypatch):

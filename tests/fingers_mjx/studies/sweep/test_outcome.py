@@ -5,6 +5,7 @@ import json
 import pytest
 
 from fingers_mjx.studies.sweep.outcome import (
+    Outcome,
     forget_outcome,
     last_lines,
     note_outcome,
@@ -45,6 +46,17 @@ def test_how_a_worker_ended_decides(tmp_path, run, status, said, verdict, words)
     assert found.verdict == verdict
     assert words in found.reason
     assert said or "amid iteration 3" in found.reason
+
+
+def test_a_divergence_may_not_come_again_where_trainings_differ(tmp_path, run):
+    """Negative control: other failures are what they are everywhere."""
+    note_outcome(tmp_path, KEY, 3, "diverged at iteration 7")
+    found = outcome(tmp_path, KEY, run, 3, repeatable=False)
+    assert found == Outcome("again", "diverged at iteration 7", at_last="diverged")
+    for status, verdict in ((1, "again"), (2, "failed"), (4, "full")):
+        note_outcome(tmp_path, KEY, status, "for a reason")
+        both = [outcome(tmp_path, KEY, run, status, same) for same in (True, False)]
+        assert both == [Outcome(verdict, "for a reason")] * 2
 
 
 def test_a_hang_differs_from_a_signal_by_the_watchdog(tmp_path, run):

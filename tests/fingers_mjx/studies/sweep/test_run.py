@@ -15,6 +15,7 @@ from support.sweep_setup import (
     ENGINES,
     journal,
     plan_faults,
+    pretend_warp,
     run_fake,
     run_fake_on,
     states,
@@ -88,6 +89,40 @@ def test_the_same_command_trains_what_is_missing_and_nothing_else(tmp_path):
     done = Counter(journal(tmp_path))
     run_fake(tmp_path, seeds=4)
     assert Counter(journal(tmp_path)) == done
+
+
+@pytest.mark.parametrize(
+    ("backend", "wrong", "state", "attempts"),
+    [
+        ("warp", ["nan"], "done", 2),
+        ("warp", ["nan", "nan"], "diverged", 2),
+        ("warp", ["killed", "nan"], "diverged", 2),
+        ("cpu", ["nan"], "diverged", 1),
+    ],
+)
+def test_a_member_that_diverged_on_warp_is_tried_once_more(
+    tmp_path, monkeypatch, backend, wrong, state, attempts
+):
+    """Negative control: on the CPU it would diverge again."""
+    pretend_warp(monkeypatch)
+    plan_faults(tmp_path, {"lift/0": wrong})
+    for _ in range(2):  # the same command changes nothing
+        manifest = run_fake(tmp_path, backend=backend)
+        [member] = [m for m in manifest.members if str(m.key) == "lift/0"]
+        assert (member.state, member.attempts) == (state, attempts)
+        assert ("diverged at iteration 2" in member.reason) == (state == "diverged")
+        assert Counter(states(manifest).values())["done"] == 3 + (state == "done")
+
+
+def test_promotion_goes_on_without_a_member_that_diverged_on_warp(
+    tmp_path, monkeypatch
+):
+    pretend_warp(monkeypatch)
+    plan_faults(tmp_path, {"plain/0": ["nan", "nan"]})
+    promote = {"top": 1, "seeds": 1, "by": "task_speed_mps"}
+    manifest = run_fake(tmp_path, promote=promote, backend="warp")
+    assert states(manifest)["plain/0"] == "diverged"
+    assert states(manifest)["lift/2"] == "done"
 
 
 def test_a_full_disk_stops_the_sweep_and_the_next_start_finishes_it(tmp_path):

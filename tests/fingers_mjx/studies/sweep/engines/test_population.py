@@ -3,7 +3,15 @@
 import dataclasses
 from types import SimpleNamespace
 
-from support.sweep_setup import TINY, plan_faults, run_fake, states, sweep
+import pytest
+from support.sweep_setup import (
+    TINY,
+    plan_faults,
+    pretend_warp,
+    run_fake,
+    states,
+    sweep,
+)
 from support.sweep_worker import finish
 
 from envs.errors import InputError
@@ -12,6 +20,7 @@ from fingers_mjx.studies.sweep.engines import population as engine
 from fingers_mjx.studies.sweep.engines.population import machine_worlds, population
 from fingers_mjx.studies.sweep.plan import Key, keys, trainings
 from fingers_mjx.studies.sweep.resolve import keep_sweep
+from fingers_mjx.training.member import END_FILE
 
 CONFIGURATIONS = {
     "plain": {},
@@ -90,6 +99,23 @@ def test_faults_in_one_program_are_each_members_own(tmp_path):
     }
     log = (tmp_path / "runs/lift/1/log.txt").read_text("utf-8")
     assert log.splitlines()[0] == "in one program with plain/0, whose log has the lines"
+
+
+@pytest.mark.parametrize(("backend", "together"), [("warp", [0, 1]), ("cpu", [0])])
+def test_members_that_diverged_on_warp_begin_again_together(
+    tmp_path, monkeypatch, backend, together
+):
+    """Wherever they were; negative control: on the CPU they would go on from there."""
+    pretend_warp(monkeypatch)
+    changes = {"configurations": {"plain": {}}, "seeds": 6, "backend": backend}
+    spec = keep_sweep(sweep(**changes, processes=1), tmp_path / "spec.yaml", tmp_path)
+    for seed, saved in ((0, "00000002"), (1, "00000001")):
+        run = Key("plain", seed).directory(tmp_path) / "train"
+        (run / "checkpoints" / saved).mkdir(parents=True)
+        (run / END_FILE).touch()
+    made = population(spec, tmp_path)
+    found = made.choose(keys(spec), lambda key: int(key.seed < 2))
+    assert [key.seed for key in found] == together
 
 
 ROOM = "env.contacts_per_world"
