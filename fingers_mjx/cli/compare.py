@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import shlex
 import sys
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fingers_mjx.cli.arguments import options
@@ -26,7 +25,7 @@ def add(commands) -> None:
         "learning curves.",
         computes=False,
     )
-    parser.set_defaults(needs_jax=False)
+    parser.set_defaults(check=_check, needs_jax=False)
     options.path(parser, "sweep", metavar="DIR", help="directory of fingers sweep")
     what = "configuration that the others are compared with"
     parser.add_argument("--baseline", metavar="NAME", help=what)
@@ -45,24 +44,30 @@ def add(commands) -> None:
     )
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what is no sweep, before the statistics load; keeps its manifest."""
+    from envs.errors import InputError
+    from fingers_mjx.studies.sweep.manifest import read_manifest
+
+    args.manifest = read_manifest(args.sweep)
+    if args.baseline is None:
+        names = ", ".join(args.manifest.configurations)
+        raise InputError("--baseline", "", "nothing", f"one of {names}")
+    args.out = args.out or args.sweep / "comparison"
+    options.check_directory("--out", args.out)
+
+
 def run(args: argparse.Namespace) -> int:
     """Compares; the table goes to stdout."""
-    from envs.errors import InputError
     from fingers_mjx.studies.comparison.comparison import check_complete, compared
     from fingers_mjx.studies.comparison.curves import read_curves
     from fingers_mjx.studies.comparison.files import write_comparison
     from fingers_mjx.studies.comparison.page import PAGE_FILE, write_page
     from fingers_mjx.studies.comparison.results import read_results
-    from fingers_mjx.studies.sweep.manifest import read_manifest
     from fingers_mjx.studies.sweep.promote import choosing
     from fingers_mjx.studies.sweep.resolve import saved_sweep
 
-    manifest = read_manifest(args.sweep)
-    if args.baseline is None:
-        names = ", ".join(manifest.configurations)
-        raise InputError("--baseline", "", "nothing", f"one of {names}")
-    out: Path = args.out or args.sweep / "comparison"
-    options.check_directory("--out", out)
+    manifest, out = args.manifest, args.out
     chose = choosing(saved_sweep(args.sweep), manifest)
     results = read_results(args.sweep, manifest, chose)
     if not args.allow_partial:

@@ -17,6 +17,7 @@ def add(commands) -> None:
         "committed policy, trains a small one, exports it, and writes one "
         "report.html.",
     )
+    parser.set_defaults(check=_check)
     options.path(parser, "--out", metavar="DIR", default=Path("demo"))
     options.path(
         parser,
@@ -26,11 +27,19 @@ def add(commands) -> None:
     )
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be shown, before JAX loads."""
+    from fingers_mjx.policy.place import check_kind
+
+    options.check_directory("--out", args.out)
+    if args.policy is not None:
+        check_kind(args.policy)
+
+
 def run(args: argparse.Namespace) -> int:
     """Runs the demonstration; progress and the place of the report go to stdout."""
     from fingers_mjx.demo.demo import POLICY_DIR, demo
 
-    options.check_directory("--out", args.out)
     command = f"fingers demo --out {args.out}"
     command += f" --policy {args.policy}" if args.policy else ""
     print(f"report: {demo(args.out, args.policy or POLICY_DIR, [command])}")

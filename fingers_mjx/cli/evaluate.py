@@ -26,7 +26,7 @@ def add(commands) -> None:
         "for a run directory, writes summary, table of episodes and figures to "
         "RUN/eval unless --out says otherwise.",
     )
-    parser.set_defaults(check=options.check_policy)
+    parser.set_defaults(check=_check)
     options.offer_settings(parser, options.policy_settings, _preview)
     options.path(parser, "policy", metavar="POLICY", help=options.POLICY_HELP)
     options.episodes(parser, 256)
@@ -48,6 +48,15 @@ def add(commands) -> None:
     options.path(parser, "--out", metavar="DIR", help=what)
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be measured or kept, before JAX loads."""
+    options.check_policy(args)
+    if len(args.commands or ()) > 1:
+        raise InputError("--command", "", f"{len(args.commands)} commands", "one")
+    options.check_file("--json", args.json)
+    options.check_directory("--out", args.out)
+
+
 def run(args: argparse.Namespace) -> int:
     """Evaluates; the table goes to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary, print_measures
@@ -57,10 +66,6 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.training.counting import counting
 
     backend = options.backend_of(args)
-    if len(args.commands or ()) > 1:
-        raise InputError("--command", "", f"{len(args.commands)} commands", "one")
-    options.check_file("--json", args.json)
-    options.check_directory("--out", args.out)
     loaded = load_source(args.policy)
     source = dataclasses.replace(loaded, setup=_setup(args, loaded.setup))
     with counting(sys.stderr, "evaluating", "steps") as progress:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.arguments.inputs import check_hand
 
 if TYPE_CHECKING:
     from envs.hand.hand_file import HandFile
@@ -38,6 +39,7 @@ def _add_show(actions) -> None:
         "normals and support polygon.",
         computes=False,
     )
+    parser.set_defaults(check=_check_show)
     options.path(parser, "--out", metavar="DIR", default=Path("hand"))
     options.path(parser, "--hand", help="default: the paper's hand")
 
@@ -51,6 +53,7 @@ def _add_stance(actions) -> None:
         "Searches the stance, settles it for 4 s and prints it as JSON.",
         computes=False,
     )
+    parser.set_defaults(check=_check_file)
     options.seed(parser)
     what = "random starts of the search"
     options.value(parser, "--starts", options.whole(1), STANCE_STARTS, what)
@@ -68,7 +71,7 @@ def _add_mjcf(actions) -> None:
         "--driver sim, or to look at in any MuJoCo viewer.",
         computes=False,
     )
-    parser.set_defaults(needs_jax=False)
+    parser.set_defaults(check=_check_file, needs_jax=False)
     options.path(parser, "-o", "--out", help="instead of stdout")
     options.path(parser, "--hand", help="default: the paper's hand")
 
@@ -85,6 +88,7 @@ def _add_import(actions) -> None:
         "searched.",
         computes=False,
     )
+    parser.set_defaults(check=_check_import)
     options.path(parser, "mjcf", metavar="MJCF", help="such as vendor.xml")
     what = "YAML: joints, our names to the model's, or fingers; palm_quat; drive"
     options.path(parser, "--joint-map", help=what)
@@ -94,15 +98,37 @@ def _add_import(actions) -> None:
     options.value(parser, "--starts", options.whole(1), STANCE_STARTS, what)
 
 
+def _check_show(args: argparse.Namespace) -> None:
+    """Refuses what cannot be drawn, before JAX loads and Pillow is asked for."""
+    options.check_directory("--out", args.out)
+    check_hand(args.hand)
+
+
+def _check_file(args: argparse.Namespace) -> None:
+    """Refuses what is no hand or cannot be written, before JAX loads."""
+    options.check_file("--out", args.out)
+    check_hand(args.hand)
+
+
+def _check_import(args: argparse.Namespace) -> None:
+    """Refuses files that cannot be imported, before JAX loads; keeps the map."""
+    from envs.config.typed import load_yaml
+    from envs.hand.importing.files import check_files
+    from envs.hand.importing.joint_map import JointMap
+
+    options.check_file("--out", args.out)
+    args.map = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
+    check_files(args.mjcf)
+
+
 def show(args: argparse.Namespace) -> int:
     """Draws the stance and prints it in numbers."""
-    options.check_directory("--out", args.out)
-    hand = _hand(args)  # a file that is no hand is refused before Pillow is asked for
     from PIL import Image
 
     from envs.hand.stance import stance_of
     from fingers_mjx.pictures.hand import facts, pictures, posed
 
+    hand = _hand(args)
     standing = posed(hand, stance_of(hand))
     for name, value in facts(standing).items():
         print(f"{name:24} {value:8.1f}")
@@ -118,7 +144,6 @@ def stance(args: argparse.Namespace) -> int:
     from envs.hand.stance import settle, stance_json
     from envs.hand.stance_search import search_stance
 
-    options.check_file("--out", args.out)
     hand = _hand(args)
     qpos, target = search_stance(hand, args.seed, args.starts)
     return _write(stance_json(settle(hand, qpos, target)), args.out)
@@ -128,25 +153,20 @@ def mjcf(args: argparse.Namespace) -> int:
     """Writes the model of the hand."""
     from envs.hand.standing_mjcf import standing_mjcf
 
-    options.check_file("--out", args.out)
     return _write(standing_mjcf(_hand(args)), args.out)
 
 
 def import_mjcf(args: argparse.Namespace) -> int:
     """Imports, lists what was filled in, and writes the hand file."""
-    from envs.config.typed import load_yaml
     from envs.hand.hand_file import hand_yaml
     from envs.hand.importing.convert import import_hand
-    from envs.hand.importing.joint_map import JointMap
     from envs.hand.stance_search import with_stance
 
-    options.check_file("--out", args.out)
-    given = load_yaml(JointMap, args.joint_map) if args.joint_map else JointMap()
-    found = import_hand(args.mjcf, given)
+    found = import_hand(args.mjcf, args.map)
     for sentence in found.notes:
         print(sentence)
     hand = found.hand
-    if given.fingers:
+    if args.map.fingers:
         hand = with_stance(hand, args.seed, args.starts, progress=_progress)
     print(_standing(hand))
     _write(hand_yaml(hand), args.out)
@@ -161,7 +181,6 @@ def _hand(args: argparse.Namespace) -> HandFile:
 
 
 def _write(text: str, out: Path | None) -> int:
-
     if out:
         out.parent.mkdir(parents=True, exist_ok=True)
         write_atomic(out, text)

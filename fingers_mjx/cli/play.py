@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from envs.errors import InputError, one_of
 from fingers_mjx.cli.arguments import options
 from fingers_mjx.cli.machine.jax_ready import prepare_jax
-from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
+from fingers_mjx.cli.play_keys import key_times, keys_asked, keys_named, start_board
 from fingers_mjx.play.sokoban import LEVELS
 
 if TYPE_CHECKING:
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 CRAWL_POLICY = Path(__file__).parents[1] / "policies" / "crawl"
 """The committed policy that crawls."""
+VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 
 
 def add(commands) -> None:
@@ -110,12 +111,26 @@ def _add_keys(parser) -> None:
 
 
 def _check(args: argparse.Namespace) -> None:
-    """Refuses what cannot be played, before JAX loads."""
+    """Refuses what cannot be played, before JAX loads; reads the log of the ghost."""
+    from fingers_mjx.policy.place import check_kind
+    from sysid.logs.read import read_log
+
     if args.policy is None and not args.viewer:
         valid = "a run or an exported bundle, or --viewer"
         raise InputError("play", "POLICY", "nothing", valid)
     args.policy = args.policy or CRAWL_POLICY
     options.check_policy(args)
+    if args.then is not None:
+        check_kind(args.then)
+    if args.keys is not None:
+        keys_named(args.keys)
+    if args.video and args.video.suffix not in VIDEO_SUFFIXES:
+        valid = one_of(VIDEO_SUFFIXES)
+        raise InputError("--video", "suffix", args.video.suffix, valid)
+    options.check_file("--json", args.json)
+    options.check_file("--video", args.video)
+    if args.ghost is not None:
+        args.ghost = read_log(args.ghost)
 
 
 def run(args: argparse.Namespace) -> int:
@@ -143,15 +158,9 @@ def _play(args: argparse.Namespace) -> int:
     from fingers_mjx.play.episodes import play_episodes, schedule_of
     from fingers_mjx.play.keyboard import KeyPlayer, keys_story
     from fingers_mjx.play.recovery import RecoveryPlayer, is_recovery, story
-    from fingers_mjx.play.video import VIDEO_SUFFIXES
     from fingers_mjx.policy.source import PolicySource, load_bundle_setup
     from fingers_mjx.training.counting import counting
 
-    if args.video and args.video.suffix not in VIDEO_SUFFIXES:
-        valid = one_of(VIDEO_SUFFIXES)
-        raise InputError("--video", "suffix", args.video.suffix, valid)
-    options.check_file("--json", args.json)
-    options.check_file("--video", args.video)
     if args.viewer:
         return _watch(args)
     bundle, trained = load_bundle_setup(args.policy)
@@ -183,11 +192,9 @@ def _watch(args: argparse.Namespace) -> int:
     from fingers_mjx.play.viewer.watch import Watched, watch
     from fingers_mjx.policy.source import load_bundle_setup
     from fingers_mjx.training.compile_cache import use_compile_cache
-    from sysid.logs.read import read_log
 
     use_compile_cache()
     bundle, trained = load_bundle_setup(args.policy)
-    log = None if args.ghost is None else read_log(args.ghost)
     command = None
     if args.commands and args.then is None:  # the page has sliders for it
         command, args.commands = tuple(args.commands[0]), None
@@ -198,7 +205,7 @@ def _watch(args: argparse.Namespace) -> int:
         lambda setup: _player(args, setup, bundle),
         args.seed,
         command,
-        log,
+        args.ghost,
     )
     watch(watched, args.port)
     return 0

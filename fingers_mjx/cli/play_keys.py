@@ -20,8 +20,6 @@ def keys_asked(args: argparse.Namespace, bundle: Bundle) -> tuple[str, ...] | No
     Raises:
         InputError: for a policy of another task, both options, or an unknown key.
     """
-    from fingers_robot.behaviour.keyboard.keys import ARROWS
-
     if args.keys is None and args.level is None:
         return None
     option = "--keys" if args.level is None else "--level"
@@ -29,9 +27,21 @@ def keys_asked(args: argparse.Namespace, bundle: Bundle) -> tuple[str, ...] | No
         raise InputError(option, "", bundle.manifest.task, "a keyboard policy")
     if args.keys is not None and args.level is not None:
         raise InputError("--keys", "", args.keys, "either --keys or --level")
-    if args.level:
-        return SOLUTIONS[LEVELS[args.level]]
-    names = tuple(name.strip() for name in str(args.keys).split(","))
+    return SOLUTIONS[LEVELS[args.level]] if args.level else keys_named(str(args.keys))
+
+
+def keys_named(text: str) -> tuple[str, ...]:
+    """Returns keys by their names.
+
+    Args:
+        text: that `--keys` gives, such as `up,left`.
+
+    Raises:
+        InputError: for an unknown key.
+    """
+    from fingers_robot.behaviour.keyboard.keys import ARROWS
+
+    names = tuple(name.strip() for name in text.split(","))
     for name in names:
         if name not in ARROWS:
             raise InputError("--keys", "", name or "nothing", one_of(ARROWS, name))

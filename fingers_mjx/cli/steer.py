@@ -22,7 +22,7 @@ def add(commands) -> None:
         "and at rest; then how the robot's heading controller holds and changes its "
         "heading while it walks.",
     )
-    parser.set_defaults(check=options.check_policy)
+    parser.set_defaults(check=_check)
     options.path(parser, "policy", metavar="POLICY", help=options.POLICY_HELP)
     options.episodes(parser, 32)
     options.seed(parser)
@@ -39,6 +39,12 @@ def add(commands) -> None:
     options.path(parser, "--json", help="summary to write")
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be measured or kept, before JAX loads."""
+    options.check_policy(args)
+    options.check_file("--json", args.json)
+
+
 def run(args: argparse.Namespace) -> int:
     """Measures; the tables go to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary
@@ -52,7 +58,6 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.training.counting import counting
     from fingers_robot.behaviour.heading import HeadingConfig
 
-    options.check_file("--json", args.json)
     course = Course(args.episodes, args.seed, options.backend_of(args), args.seconds)
     source = load_source(args.policy)
     setup = nominal(source.setup) if args.nominal else source.setup

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
 from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.arguments.inputs import check_hand, check_start
 from fingers_mjx.cli.machine.jax_ready import prepare_jax
 from fingers_mjx.runs.members import MEMBERS
 
@@ -27,7 +28,6 @@ _FOR_NEW_RUNS = ("hand", "out", "warm_start", "schedules", "seeds")
 _WORDS = ("task", "preset", "seed", "backend")
 """Settings for which the command line has words of its own."""
 
-MAX_START_BYTES = 64 << 20
 MOST_SEEDS = 100
 
 
@@ -86,24 +86,22 @@ def check(args: argparse.Namespace) -> None:
 
     Raises:
         InputError: an unknown name or a value out of range; sizes that no machine or
-            not this one has room for; or a start that is neither a folder nor a
-            regular file.
+            not this one has room for; a start that is neither a folder nor a regular
+            file; or what is no hand file.
         ModuleNotFoundError: a logger that is not installed.
     """
-    from fingers_deploy.files import is_folder, open_regular
     from fingers_mjx.training.memory import check_memory
 
     _check_words(args.settings)
     options.check_backend(args.backend)
-    begin = args.warm_start
-    if begin is not None and not is_folder(begin) and begin.exists():
-        open_regular(begin, MAX_START_BYTES).close()
+    check_start(args.warm_start)
     options.check_directory("--out", args.out)
     if args.resume is not None:
         for path in _resumed_paths(args):
             _check_loggers(_resumed(args, path))
         return
     settings = _new(args, args.backend or "cpu")
+    check_hand(args.hand)
     _check_loggers(settings)
     if args.preset != "adapt":  # sizes that have been trained with
         check_memory(settings.train, args.seeds or 1)

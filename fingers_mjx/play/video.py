@@ -15,7 +15,6 @@ from fingers_mjx.pictures.video import Frame, follow, frames, write_animation, w
 from fingers_mjx.play.player import Played
 from rewards.pushing import DELIVERED_M
 
-VIDEO_SUFFIXES = (".mp4", ".webp", ".gif")
 ASPECT = 9 / 16
 AHEAD_M = 0.06
 """From the palm's origin to the middle of the hand."""
@@ -31,7 +30,7 @@ class Film:
     """How an episode is filmed.
 
     Attributes:
-        path: file to write, with one of `VIDEO_SUFFIXES`.
+        path: file to write: .mp4, or an animation, .webp or .gif.
         fps: frames per second.
         width: of the picture; its height is 9/16 of that.
         progress: called with (frames drawn, frames in all).

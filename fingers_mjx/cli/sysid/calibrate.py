@@ -25,6 +25,7 @@ def add(actions) -> None:
         "pulls (logs with a setting normal_n and a column force.<finger>). Writes "
         "hand.yaml, calibration.json and pictures.",
     )
+    parser.set_defaults(check=records.check)
     records.logs(parser, "logs", nargs="+")
     records.mechanism(parser)
     options.path(parser, "-o", "--out", metavar="DIR", default=Path("calibration"))
@@ -37,7 +38,7 @@ def run(args: argparse.Namespace) -> int:
     from sysid.calibration.plots import write_plots
 
     mechanism = records.mechanism_of(args)
-    found = calibrate(records.read(args.logs, args.map), mechanism, report=print)
+    found = calibrate(args.records, mechanism, report=print)
     args.out.mkdir(parents=True, exist_ok=True)
     (args.out / "calibration.json").write_text(found.to_json(), encoding="utf-8")
     write_plots(found, args.out)

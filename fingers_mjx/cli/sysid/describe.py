@@ -28,6 +28,7 @@ def add(actions) -> None:
         "column and unit of the effort, gains with wide tolerances, what can be "
         "examined, each with its reason. On a terminal it asks what no record says.",
     )
+    parser.set_defaults(check=_check)
     records.logs(parser, "logs", nargs="+")
     options.path(parser, "--mjcf", required=True, help="masses and axes, as MJCF")
     parser.add_argument(
@@ -36,16 +37,23 @@ def add(actions) -> None:
     options.path(parser, "-o", "--out", metavar="FILE", default=Path("drive.yaml"))
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be read or written, before JAX loads; keeps the logs."""
+    from envs.hand.importing.files import check_files
+
+    if args.out.exists():
+        raise InputError(args.out, "", "a file that is there", "a new one, by -o FILE")
+    args.records = records.read(args.logs, args.map)
+    check_files(args.mjcf)
+
+
 def run(args: argparse.Namespace) -> int:
     """Writes what is proposed."""
     from sysid.description.describe import describe
     from sysid.description.text import drive_text
     from sysid.mechanism import load_mjcf
 
-    if args.out.exists():
-        raise InputError(args.out, "", "a file that is there", "a new one, by -o FILE")
-    logs = records.read(args.logs, args.map)
-    proposals = describe(logs, load_mjcf(args.mjcf), args.mjcf)
+    proposals = describe(args.records, load_mjcf(args.mjcf), args.mjcf)
     if sys.stdin.isatty() and not args.no_questions:
         proposals = _asked(proposals)
     text = drive_text(proposals, ", ".join(str(path) for path in args.logs))

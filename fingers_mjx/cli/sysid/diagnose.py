@@ -32,6 +32,7 @@ def add(actions) -> None:
         "OUT/diagnosis.json, OUT/report.html and, for the hand, OUT/hand.yaml with "
         "the effects in it.",
     )
+    parser.set_defaults(check=_check)
     records.logs(parser, "logs", nargs="+")
     records.mechanism(parser)
     options.seed(parser)
@@ -41,14 +42,18 @@ def add(actions) -> None:
     options.path(parser, "-o", "--out", metavar="OUT", default=Path("diagnosis"))
 
 
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be read or written, before JAX loads; keeps the logs."""
+    if args.out.exists() and not args.out.is_dir():
+        raise InputError(args.out, "", "a file", "a directory for the results")
+    records.check(args)
+
+
 def run(args: argparse.Namespace) -> int:
     """Names what the simulation lacks; writes verdict, hand file and report."""
     from sysid.diagnosis.diagnose import examine
 
-    if args.out.exists() and not args.out.is_dir():
-        raise InputError(args.out, "", "a file", "a directory for the results")
-    mechanism = records.mechanism_of(args)
-    logs = records.read(args.logs, args.map)
+    mechanism, logs = records.mechanism_of(args), args.records
     if _walks(logs):
         hand = _without_effects(mechanism.hand, args, logs)
         return _write(args.out, _diagnosed_walk(logs[0], hand), hand)

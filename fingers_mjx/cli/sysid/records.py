@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.arguments.inputs import check_hand
 
 if TYPE_CHECKING:
     from sysid.logs.log import MeasuredLog
@@ -25,6 +26,46 @@ def mechanism(parser) -> None:
     options.path(parser, "--hand", help="hand.yaml; default: the paper's hand")
     options.path(parser, "--mjcf", help="another mechanism, with --drive")
     options.path(parser, "--drive", help="drive.yaml")
+
+
+def check(args: argparse.Namespace) -> None:
+    """Refuses a mechanism or logs that cannot be read, before JAX loads.
+
+    Args:
+        args: of an action with both; the logs are kept in `records`, since they may
+            be large.
+
+    Raises:
+        InputError: as `check_mechanism` and `read`.
+    """
+    check_mechanism(args)
+    args.records = read(args.logs, args.map)
+
+
+def check_mechanism(args: argparse.Namespace) -> None:
+    """Refuses files that name no mechanism, before JAX loads.
+
+    What an MJCF compiles to and what its drives are is found later: the effects of
+    drives load JAX.
+
+    Args:
+        args: of an action with a mechanism.
+
+    Raises:
+        InputError: an MJCF without drives, drives without an MJCF, or both kinds; or
+            a file that cannot be read.
+    """
+    from envs.config.strict_yaml import MAX_YAML_BYTES
+    from envs.hand.importing.files import check_files
+    from fingers_deploy.files import open_regular
+
+    if (args.mjcf is None) != (args.drive is None) or (args.mjcf and args.hand):
+        found = " ".join(f"--{n}" for n in ("hand", "mjcf", "drive") if vars(args)[n])
+        raise InputError("arguments", "", found, "--hand, or --mjcf with --drive")
+    check_hand(args.hand)
+    if args.mjcf is not None:
+        check_files(args.mjcf)
+        open_regular(args.drive, MAX_YAML_BYTES).close()
 
 
 def read(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
@@ -46,17 +87,14 @@ def read(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
 
 
 def mechanism_of(args: argparse.Namespace) -> Mechanism:
-    """Returns the mechanism that the arguments name.
+    """Returns the mechanism that the arguments name, which `check_mechanism` let pass.
 
     Raises:
-        InputError: an MJCF without drives, drives without an MJCF, or both kinds.
+        InputError: files that are no mechanism.
     """
     from envs.hand.hand_file import load_hand_file
     from sysid.mechanism import hand_mechanism, mjcf_mechanism
 
-    if (args.mjcf is None) != (args.drive is None) or (args.mjcf and args.hand):
-        found = " ".join(f"--{n}" for n in ("hand", "mjcf", "drive") if vars(args)[n])
-        raise InputError("arguments", "", found, "--hand, or --mjcf with --drive")
     if args.mjcf is not None:
         return mjcf_mechanism(args.mjcf, args.drive)
     return hand_mechanism(load_hand_file(args.hand) if args.hand else None)

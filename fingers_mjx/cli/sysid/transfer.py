@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import sys
 from pathlib import Path
@@ -11,9 +12,11 @@ from typing import TYPE_CHECKING, Any
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
+from fingers_mjx.cli.arguments.inputs import check_hand, check_start
 
 if TYPE_CHECKING:
     from fingers_mjx.policy.source import PolicySource
+    from fingers_mjx.runs.settings import Settings
     from fingers_mjx.studies.transfer import Evaluated
 
 NAMES: tuple[str, str] = ("default", "extended")
@@ -43,6 +46,7 @@ def add(actions) -> None:
         "drift, survival. Writes OUT/transfer.json beside the runs. The same command "
         "goes on with what is not trained yet.",
     )
+    parser.set_defaults(check=_check)
     what = "hand.yaml of the simulator that stands for the real hand"
     options.path(parser, "--real", required=True, help=what)
     options.path(parser, "--extended", help="hand.yaml of a diagnosis")
@@ -76,13 +80,11 @@ def add(actions) -> None:
     options.path(parser, "-o", "--out", metavar="OUT", default=Path("transfer"))
 
 
-def run(args: argparse.Namespace) -> int:
-    """Trains both policies, unless they are given, and compares them."""
-    from envs.hand.hand_file import load_hand_file
-    from fingers_mjx.policy.source import load_source
-    from fingers_mjx.studies.transfer import compared, in_real_hand
+def _check(args: argparse.Namespace) -> None:
+    """Refuses what cannot be compared or trained, before JAX loads."""
+    from fingers_mjx.policy.place import check_kind
 
-    backend = options.backend_of(args)
+    options.check_backend(args.backend)
     options.check_directory("--out", args.out)
     if (args.policies is None) == (args.extended is None):
         found = "both" if args.policies else "neither"
@@ -91,6 +93,22 @@ def run(args: argparse.Namespace) -> int:
     if args.policies and args.seeds is not None:
         valid = "none with --policies: every pair is a seed"
         raise InputError("--seeds", "", args.seeds, valid)
+    for path in (args.real, args.extended, args.default):
+        check_hand(path)
+    for path in itertools.chain(*(args.policies or ())):
+        check_kind(path)
+    if args.policies is None:
+        check_start(args.warm_start)
+        _settings(args, args.backend or "cpu")
+
+
+def run(args: argparse.Namespace) -> int:
+    """Trains both policies, unless they are given, and compares them."""
+    from envs.hand.hand_file import load_hand_file
+    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.studies.transfer import compared, in_real_hand
+
+    backend = options.backend_of(args)
     real = load_hand_file(args.real)
     pairs = args.policies or _trained(args)
     sources: dict[str, list[PolicySource]] = {
@@ -124,16 +142,23 @@ def _seeds(args: argparse.Namespace) -> range:
     return range(args.seed, args.seed + (args.seeds or SEEDS))
 
 
+def _settings(args: argparse.Namespace, backend: str) -> Settings:
+    """Settings of the trainings."""
+    from fingers_mjx.runs.settings import new_settings, overridden
+
+    config = options.train_config(args, backend, args.seed)
+    return overridden(new_settings(config), args.settings)
+
+
 def _trained(args: argparse.Namespace) -> list[list[Path]]:
     """Trains what is not trained yet; returns the two runs of each seed."""
-    from envs.hand.hand_file import load_hand_file
-    from fingers_mjx.runs.setup import new_setup, overridden, with_seed
+    from envs.hand.hand_file import DEFAULT_HAND_FILE, load_hand_file
+    from fingers_mjx.runs.setup import with_hand, with_seed
     from fingers_mjx.studies.transfer import train_on
     from fingers_mjx.training.progress import reporter
 
-    backend = options.backend_of(args)
-    config = options.train_config(args, backend, args.seed)
-    setup = overridden(new_setup(config, args.default), args.settings)
+    settings = _settings(args, options.backend_of(args))
+    setup = with_hand(settings, load_hand_file(args.default or DEFAULT_HAND_FILE))
     hands = {"default": setup.hand, "extended": load_hand_file(args.extended)}
     if hands["default"].sha256 == hands["extended"].sha256:
         valid = "another hand than the default one"

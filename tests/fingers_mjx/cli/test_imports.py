@@ -4,9 +4,12 @@ import subprocess
 import sys
 
 import pytest
+from support.house import ROOT
 from support.synthetic_sweep import study, write_sweep
 from support.sysid_logs import small_log
 
+from envs.hand.hand_file import DEFAULT_HAND_FILE
+from fingers_mjx.cli.play import CRAWL_POLICY
 from sysid.logs.read import write_log
 
 HEAVY = ("jax", "brax", "mujoco", "flax", "onnxruntime", "onnx", "scipy", "numpy")
@@ -52,6 +55,78 @@ def test_a_typo_is_reported_before_anything_heavy_is_imported(argv, nearest):
     assert said.startswith("fingers: ") and said.count("\n") == 1 and nearest in said
 
 
+CRAWL, HAND = str(CRAWL_POLICY), str(DEFAULT_HAND_FILE)
+MJCF = ["--mjcf", "no.xml"]
+NOT_THERE = [
+    (["eval", "no"], "no: found no such file"),
+    (["eval", CRAWL, "--json", "/proc/no.json"], "--json: found /proc/no.json"),
+    (["steer", "no"], "no: found no such file"),
+    (["steer", CRAWL, "--json", "/proc/no.json"], "--json: found /proc/no.json"),
+    (["play", "no"], "no: found no such file"),
+    (["play", CRAWL, "--then", "no"], "no: found no such file"),
+    (["play", CRAWL, "--keys", "up,lft"], "did you mean left?"),
+    (["play", CRAWL, "--video", "x.mp3"], "found .mp3; valid: one of .mp4"),
+    (["play", "--viewer", "--ghost", "no.csv"], "no.csv: found no such file"),
+    (["export", "no"], "no: found no directory"),
+    (["demo", "--policy", "no"], "no: found no such file"),
+    (["compare", "no", "--baseline", "base"], "no/sweep.json: found no sweep"),
+    (["train", "crawl", "--hand", "no.yaml"], "no.yaml: found No such file"),
+    (["train", "crawl", "--hand", "bad.yaml"], "bad.yaml: schema: found 7"),
+    (["train", "crawl", "--warm-start", "no"], "no: found no such file"),
+    (["hand", "show", "--hand", "no.yaml"], "no.yaml: found No such file"),
+    (["hand", "stance", "--hand", "no.yaml"], "no.yaml: found No such file"),
+    (["hand", "import", "no.xml", "-o", "hand.yaml"], "valid: a readable MJCF file"),
+    (
+        ["hand", "import", "no.xml", "-o", "hand.yaml", "--joint-map", "no.yaml"],
+        "no.yaml: found No such file",
+    ),
+    (["sysid", "describe", "no.csv", *MJCF], "no.csv: found no such file"),
+    (["sysid", "describe", "knee.csv", *MJCF], "valid: a readable MJCF file"),
+    (["sysid", "excite", "--hand", "no.yaml"], "no.yaml: found No such file"),
+    (["sysid", "calibrate", "no.csv"], "no.csv: found no such file"),
+    (["sysid", "diagnose", "no.csv"], "no.csv: found no such file"),
+    (["sysid", "diagnose", "knee.csv", *MJCF], "valid: --hand, or --mjcf with --drive"),
+    (
+        ["sysid", "diagnose", "knee.csv", *MJCF, "--drive", "no.yaml"],
+        "no.xml: found [Errno 2] No such file",
+    ),
+    (
+        ["sysid", "diagnose", "knee.csv", "--mjcf", "arm.xml", "--drive", "no.yaml"],
+        "no.yaml: found No such file",
+    ),
+    (
+        ["sysid", "transfer", "--real", "no.yaml", "--extended", "bad.yaml"],
+        "no.yaml: found No such file",
+    ),
+    (
+        ["sysid", "transfer", "--real", HAND, "--policies", CRAWL, "no"],
+        "no: found no such file",
+    ),
+    (
+        ["sysid", "transfer", "--real", HAND, "--extended", HAND, "--task", "crawll"],
+        "did you mean crawl?",
+    ),
+]
+
+
+@pytest.mark.parametrize(
+    ("argv", "sentence"),
+    NOT_THERE,
+    ids=[" ".join(argv).replace(f"{ROOT}/", "") for argv, _ in NOT_THERE],
+)
+def test_what_is_not_there_is_reported_before_jax_is_imported(
+    argv, sentence, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    write_log(small_log(), tmp_path / "knee.csv")
+    (tmp_path / "arm.xml").write_text("<mujoco/>")
+    bad = DEFAULT_HAND_FILE.read_text().replace("schema: 1", "schema: 7")
+    (tmp_path / "bad.yaml").write_text(bad)
+    status, said, loaded = run(*argv)
+    assert status == 2 and set(loaded) <= {"numpy"}
+    assert said.startswith("fingers: ") and said.count("\n") == 1 and sentence in said
+
+
 @pytest.mark.parametrize("argv", [["--help"], ["train", "--help"], ["play", "--help"]])
 def test_help_imports_nothing_heavy(argv):
     assert run(*argv) == (0, "", [])
@@ -89,8 +164,8 @@ def test_a_sweep_is_looked_at_without_jax(argv, most, tmp_path, monkeypatch):
     assert status == 0 and set(loaded) <= most
 
 
-def test_a_command_that_computes_imports_jax(tmp_path):
+def test_a_command_that_computes_imports_jax(tmp_path, monkeypatch):
     """Negative control."""
-    argv = ["train", "crawl", "--hand", str(tmp_path / "no.yaml")]
-    status, said, loaded = run(*argv)
-    assert status == 2 and "no.yaml" in said and {"jax", "mujoco"} <= set(loaded)
+    monkeypatch.chdir(tmp_path)
+    status, said, loaded = run("train", "crawl", "--schedules", "keep")
+    assert status == 2 and "--warm-start" in said and {"jax", "mujoco"} <= set(loaded)
