@@ -131,6 +131,24 @@ def test_crawl_in_a_population_is_bit_equal_to_one_alone(straight, tmp_path):
     assert load_source(tmp_path / "other").setup.env.weights == {"lift": 5.0}
 
 
+@pytest.mark.slow
+@pytest.mark.timeout(3600)  # MJX compiles for minutes
+def test_crawl_on_mjx_is_bit_equal_alone_and_in_a_population(tmp_path):
+    """Negative control: the other member, of another seed, is not."""
+    made = setup()
+    made = dataclasses.replace(
+        made, train=dataclasses.replace(made.train, backend="jax")
+    )
+    other = dataclasses.replace(made, train=dataclasses.replace(made.train, seed=7))
+    run(tmp_path / "alone", make_env(made, TRAIN.num_envs, "jax"), made)
+    members = [Member(other, tmp_path / "other"), Member(made, tmp_path / "same")]
+    both = make_env(made, 2 * TRAIN.num_envs, "jax")
+    train_population(both, members, identity=identity(both))
+    assert_same_end(tmp_path / "alone", tmp_path / "same")
+    with pytest.raises(AssertionError):
+        assert_same_end(tmp_path / "alone", tmp_path / "other")
+
+
 @pytest.mark.gpu
 def test_resumed_crawl_on_warp_goes_on_where_it_stopped(tmp_path):
     """Warp is not deterministic: counters, curricula and rate are as saved."""
