@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 
 from envs.config.typed import load_yaml
+from envs.hand.hand_file import load_hand_file
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.spec import Sweep
 
@@ -17,6 +18,7 @@ MEMBERS = {
     "steering_walker": (2, 2),
     "push_effort": (2, 1),
     "keyboard_creep": (6, 1),
+    "diagnosis_gain": (3, 8),
 }
 
 
@@ -30,6 +32,22 @@ def test_the_sweeps_can_begin(tmp_path, name):
     made = keep_sweep(swept(name), CLAIMS / f"{name}.yaml", tmp_path)
     configurations, seeds = MEMBERS[name]
     assert (len(made.configurations), len(made.seeds)) == (configurations, seeds)
+
+
+def test_only_the_hand_differs():
+    spec = swept("diagnosis_gain")
+    assert dict(spec.set) == dict(swept("ablation").set) | {"on_overflow": "warn"}
+    assert spec.evaluate == swept("ablation").evaluate
+    assert all(set(c) <= {"hand"} for c in spec.configurations.values())
+    for name in ("deadband", "weak_finger"):
+        found, real = (
+            load_hand_file(CLAIMS / "hands" / f"{name}{suffix}.yaml")
+            for suffix in ("", "_real")
+        )
+        for ours, theirs in zip(found.effects, real.effects, strict=True):
+            assert (ours.name, ours.where) == (theirs.name, theirs.where)
+            for key, size in ours.parameters.items():
+                assert size.value == pytest.approx(theirs.parameters[key].value, 0.02)
 
 
 def test_only_rewards_differ():
