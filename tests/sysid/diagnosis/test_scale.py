@@ -31,7 +31,9 @@ def test_the_search_sees_the_same_numbers_at_any_size():
     problem, base = settled_problem(1.0)
     for factor in (1e-3, 1e3):
         other, model = settled_problem(factor)
-        assert model.score == pytest.approx(base.score, rel=1e-3)
+        assert model.fit.cost == pytest.approx(base.fit.cost, rel=2e-4)
+        # Rounding decides at which of two near optima a fold's fit ends.
+        assert model.score == pytest.approx(base.score, rel=5e-3)
         assert np.allclose(model.fit.theta, base.fit.theta, atol=1e-2)
         for slot, same in zip(problem.space.slots, other.space.slots, strict=True):
             assert same.nominal == pytest.approx(slot.nominal, rel=1e-4, abs=1e-9)
