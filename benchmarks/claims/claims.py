@@ -1,4 +1,4 @@
-"""The paper's comparative claims, and what our seeds say by a rule fixed before."""
+"""The paper's comparative claims, and what our seeds say of them by a rule."""
 
 from dataclasses import dataclass
 
