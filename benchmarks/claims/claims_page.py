@@ -60,9 +60,9 @@ claim of no effect disagrees if the interval does not have zero, and agrees if i
 zero and nothing as large as 0.79 cm/s, the paper's effect of the footprint. Nothing is
 judged before {seeds} seeds of both are there.
 
-This is the third budget. Under the first, too small by the same rule, `no_direction` was
-above `ours` (+2.1 cm/s, p = 0.03 after Holm, seven seeds); what became of both is in
-`benchmarks/claims/README.md`.
+This is the third budget. Under the first, too small by the same rule, `no_direction`
+was above `ours` (+2.1 cm/s, p = 0.03 after Holm, seven seeds); what became of both is
+in `benchmarks/claims/README.md`.
 
 ## All members so far
 
