@@ -93,7 +93,7 @@ def verdict(claim: Claim, found: Difference, walk: bool) -> str:
     Args:
         claim: as the paper has it.
         found: our difference.
-        walk: whether enough members of `ours` walk (`enough_walk`).
+        walk: whether enough members of `ours` walk: `WALK` of the `walkers`.
     """
     if found.n < SEEDS:
         return f"not yet: {found.n} of {SEEDS} seeds"
@@ -112,11 +112,11 @@ def verdict(claim: Claim, found: Difference, walk: bool) -> str:
     return "agrees" if sign == np.sign(claim.paper[0]) else "disagrees"
 
 
-def enough_walk(results: Results) -> bool:
-    """Whether `WALK` members of `ours` reach `WALKS_MPS`.
+def walkers(results: Results) -> tuple[int, int]:
+    """Returns how many members of `ours` reach `WALKS_MPS`, and how many there are.
 
     Args:
         results: of the ablation.
     """
-    speeds = results.values.get("ours", {}).get(SPEED, {})
-    return sum(speed >= WALKS_MPS for speed in speeds.values()) >= WALK
+    speeds = results.values.get("ours", {}).get(SPEED, {}).values()
+    return sum(speed >= WALKS_MPS for speed in speeds), len(speeds)

@@ -11,11 +11,12 @@ from benchmarks.claims.claims import (
     SEEDS,
     SPEED,
     TILT,
+    WALK,
     WALKS_MPS,
     Claim,
-    enough_walk,
     measured,
     verdict,
+    walkers,
 )
 from envs.config.atomic_file import write_atomic
 from fingers_mjx.studies.comparison.comparison import compared
@@ -94,31 +95,26 @@ def page(results: Results) -> str:
     Args:
         results: of the ablation.
     """
-    walk = enough_walk(results)
+    walk, ours = walkers(results)
     found = [(c, measured(c, results)) for c in CLAIMS]
-    said = [(c, d, verdict(c, d, walk)) for c, d in found]
+    said = [(c, d, verdict(c, d, walk >= WALK)) for c, d in found]
     said.sort(key=lambda row: not row[2].startswith("disagrees"))
     against = [c.text for c, _, v in said if v == "disagrees"]
     judged = any(v in ("agrees", "disagrees") for _, _, v in said)
     first = "None is contradicted." if judged else "Nothing is concluded yet."
     if against:
         first = f"**Ours contradicts the paper:** {'; '.join(against)}."
+    so_far = f"Of `ours` {walk} of {ours} seeds reach {WALKS_MPS:g} m/s so far."
     rows = [_claim_row(*row) for row in said]
     rows += [f"| {c} | {p} | not trained yet | 0 | not yet |" for c, p in UNTRAINED]
     return TEXT.format(
-        first=f"{first} {_walkers(results)}",
+        first=f"{first} {so_far}",
         claims="\n".join(rows),
         seeds=SEEDS,
         count=results.members - len(results.missing),
         members=results.members,
         arms="\n".join(_arm_row(results, name) for name in results.configurations),
     )
-
-
-def _walkers(results: Results) -> str:
-    speeds = results.values.get("ours", {}).get(SPEED, {}).values()
-    walk = sum(speed >= WALKS_MPS for speed in speeds)
-    return f"Of `ours` {walk} of {len(speeds)} seeds reach {WALKS_MPS:g} m/s so far."
 
 
 def _claim_row(claim: Claim, found: Difference, said: str) -> str:

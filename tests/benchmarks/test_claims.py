@@ -40,10 +40,8 @@ def test_only_the_hand_differs():
     assert spec.evaluate == swept("ablation").evaluate
     assert all(set(c) <= {"hand"} for c in spec.configurations.values())
     for name in ("deadband", "weak_finger"):
-        found, real = (
-            load_hand_file(CLAIMS / "hands" / f"{name}{suffix}.yaml")
-            for suffix in ("", "_real")
-        )
+        paths = (spec.configurations[name]["hand"], f"hands/{name}_real.yaml")
+        found, real = (load_hand_file(CLAIMS / str(path)) for path in paths)
         for ours, theirs in zip(found.effects, real.effects, strict=True):
             assert (ours.name, ours.where) == (theirs.name, theirs.where)
             for key, size in ours.parameters.items():

@@ -40,6 +40,9 @@ makes plays of light joints, whose links fly for long, a tenth too small."""
 BLOCK_S = 0.5
 """Length of the blocks of a record that are compared [s]."""
 
+SPEEDS = ("speed_rad_s", "up_rad_s", "down_rad_s")
+"""Limits of a speed, also by direction."""
+
 
 def standard_errors(
     problem: Problem, model: Model, samples: int
@@ -93,10 +96,6 @@ def _unmodelled(slot: Slot, u: float, data: JointTrack) -> float:
     if slot.effect == "payload_mass" and slot.nominal == 0.0:
         return slot.prior_sd
     return timing_error(slot, u, data)
-
-
-SPEEDS = ("speed_rad_s", "up_rad_s", "down_rad_s")
-"""Limits of a speed, also by direction."""
 
 
 def timing_error(slot: Slot, u: float, data: JointTrack) -> float:
