@@ -99,7 +99,7 @@ def main() -> None:
         more = f", {gain:.2f} times one after the other" if gain else ""
         print(f"{members:3} x {worlds:6}: {rate:12,.0f} steps/s{more}", flush=True)
     if args.json:
-        record = {"machine": machine(), "versions": versions(), "sizes": rows}
+        record = {"machine": machine(), **versions(), "sizes": rows}
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 

@@ -34,6 +34,7 @@ from benchmarks.speed.layers import BY_SUBSTEP, LAYERS, MOVING
 from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 from envs.rounding import fix_rounding
+from fingers_mjx.reports.page import commit_here
 
 ROUNDS = 5
 Key = tuple[str, str]
@@ -65,7 +66,7 @@ def main() -> None:
             for k, rate in rates.items()
         ]
         record = {"task": args.task, "num_envs": worlds, "machine": machine()}
-        record |= {"versions": versions(), "layers": rows, "ratios": ratios}
+        record |= versions() | {"layers": rows, "ratios": ratios}
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
@@ -171,9 +172,10 @@ def machine() -> str:
     return f"{os.cpu_count()} cores ({platform.machine()}), JAX on {device}"
 
 
-def versions() -> dict[str, str]:
-    """Returns the versions that the speed depends on most."""
-    return {"jax": jax.__version__, "mujoco": mujoco.__version__}
+def versions() -> dict[str, object]:
+    """Returns the commit, and the versions that the speed depends on most."""
+    found = {"jax": jax.__version__, "mujoco": mujoco.__version__}
+    return {"commit": commit_here(), "versions": found}
 
 
 if __name__ == "__main__":

@@ -5,6 +5,7 @@ state, so `fingers_mjx.ppo.iteration` is built from Brax's parts instead.
 """
 
 from collections.abc import Mapping
+from types import FunctionType
 from typing import Any
 
 import jax
@@ -19,6 +20,7 @@ from brax.training.types import Transition
 from flax import linen
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
+from fingers_mjx.ppo.advantages import compute_gae
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.scalars import PpoScalars
 
@@ -36,6 +38,14 @@ __all__ = [
     "sample_action",
     "update_normalizer",
 ]
+
+_compute_ppo_loss: Any = FunctionType(
+    losses.compute_ppo_loss.__code__,
+    {**vars(losses), "compute_gae": compute_gae},
+    argdefs=losses.compute_ppo_loss.__defaults__,
+)
+"""Brax's loss with our advantages; it has no argument for them, and its module stays as
+it is for whoever else imports it."""
 
 
 def make_networks(
@@ -116,6 +126,7 @@ def brax_loss(ppo_networks: PPONetworks) -> Any:
 
     `data` is a Transition of [worlds, time, ...]; of `next_observation` only the last
     time is read, so it may have length one. Truncated steps do not contribute.
+    Advantages are those of `fingers_mjx.ppo.advantages`.
     """
 
     def loss(
@@ -126,7 +137,7 @@ def brax_loss(ppo_networks: PPONetworks) -> Any:
         key: PRNGKeyArray,
     ) -> Any:
         numbers: Any = scalars
-        return losses.compute_ppo_loss(
+        return _compute_ppo_loss(
             params,
             normalizer,
             data,
