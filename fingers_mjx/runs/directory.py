@@ -39,6 +39,8 @@ RUN_FILE = "run.json"
 CONFIG_FILE = "config.yaml"
 VERSIONS_FILE = "versions.json"
 HAND_FILE = "hand.yaml"
+END_FILE = "diverged.json"
+"""Why a run diverged; only in one that did."""
 LOCK_WAIT_S = 1.0
 """Time for which a lock is tried: `is_locked` holds it for an instant [s]."""
 PACKAGES = (

@@ -12,13 +12,12 @@ from envs.config.typed import to_dict
 from envs.errors import InputError
 from fingers_mjx.ppo.state import Carry
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.runs.directory import END_FILE
 from fingers_mjx.runs.files import write_whole
 from fingers_mjx.runs.loggers.base import About
 from fingers_mjx.runs.members import MEMBERS
 from fingers_mjx.runs.setup import Setup
 from fingers_mjx.training.errors import Diverged
-
-END_FILE = "diverged.json"
 
 
 @dataclass(frozen=True)

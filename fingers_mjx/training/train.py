@@ -9,7 +9,7 @@ from typing import Any
 from envs.base import VectorEnv
 from fingers_mjx.ppo.config import check_config
 from fingers_mjx.runs import checkpoint
-from fingers_mjx.runs.directory import check_bound, open_run, record_run
+from fingers_mjx.runs.directory import END_FILE, check_bound, open_run, record_run
 from fingers_mjx.runs.loggers.base import Open
 from fingers_mjx.runs.loggers.choice import check_installed, chosen
 from fingers_mjx.runs.metrics import MetricsLog, read_metrics
@@ -19,13 +19,7 @@ from fingers_mjx.training.compile_cache import use_compile_cache
 from fingers_mjx.training.errors import Diverged
 from fingers_mjx.training.films import Films, check_drawable
 from fingers_mjx.training.loop import Loop, LoopServices, StartPoint
-from fingers_mjx.training.member import (
-    END_FILE,
-    Place,
-    about,
-    read_end,
-    shared_root,
-)
+from fingers_mjx.training.member import Place, about, read_end, shared_root
 from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.progress import OnProgress, Ticker
 from fingers_mjx.training.session import Session, bound, unset

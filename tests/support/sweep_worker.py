@@ -73,9 +73,12 @@ def train(root, name, seed):
     member = f"{name}/{seed}"
     run, wrong = root / "runs" / member / STAGE, fault(root, member)
     (run.parent / "outcome.json").unlink(missing_ok=True)
+    if (run / "diverged.json").exists():  # only on Warp is it begun again
+        run.rename(run.with_name(f"{STAGE}~diverged"))
     curve(run, 2)
     match wrong:
         case "nan":
+            (run / "diverged.json").write_text("{}", "utf-8")
             return note(root, member, 3, "diverged at iteration 2: loss is not finite")
         case "exception":
             return note(root, member, 1, "ValueError: no such thing")

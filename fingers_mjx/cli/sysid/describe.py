@@ -41,6 +41,7 @@ def _check(args: argparse.Namespace) -> None:
     """Refuses what cannot be read or written, before JAX loads; keeps the logs."""
     from envs.hand.importing.files import check_files
 
+    options.check_file("-o", args.out)
     if args.out.exists():
         raise InputError(args.out, "", "a file that is there", "a new one, by -o FILE")
     args.records = records.read(args.logs, args.map)

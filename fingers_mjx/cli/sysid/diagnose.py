@@ -32,7 +32,7 @@ def add(actions) -> None:
         "OUT/diagnosis.json, OUT/report.html and, for the hand, OUT/hand.yaml with "
         "the effects in it.",
     )
-    parser.set_defaults(check=_check)
+    parser.set_defaults(check=records.check)
     records.logs(parser, "logs", nargs="+")
     records.mechanism(parser)
     options.seed(parser)
@@ -40,13 +40,6 @@ def add(actions) -> None:
         "--no-report", action="store_true", help="without OUT/report.html"
     )
     options.path(parser, "-o", "--out", metavar="OUT", default=Path("diagnosis"))
-
-
-def _check(args: argparse.Namespace) -> None:
-    """Refuses what cannot be read or written, before JAX loads; keeps the logs."""
-    if args.out.exists() and not args.out.is_dir():
-        raise InputError(args.out, "", "a file", "a directory for the results")
-    records.check(args)
 
 
 def run(args: argparse.Namespace) -> int:

@@ -43,22 +43,23 @@ def check(args: argparse.Namespace) -> None:
 
 
 def check_mechanism(args: argparse.Namespace) -> None:
-    """Refuses files that name no mechanism, before JAX loads.
+    """Refuses files that name no mechanism, and where nothing can be written.
 
-    What an MJCF compiles to and what its drives are is found later: the effects of
-    drives load JAX.
+    That is before JAX loads. What an MJCF compiles to and what its drives are is found
+    later: the effects of drives load JAX.
 
     Args:
-        args: of an action with a mechanism.
+        args: of an action with a mechanism, and a directory for what it writes.
 
     Raises:
-        InputError: an MJCF without drives, drives without an MJCF, or both kinds; or
-            a file that cannot be read.
+        InputError: an MJCF without drives, drives without an MJCF, or both kinds; a
+            file that cannot be read, or a directory that cannot be written.
     """
     from envs.config.strict_yaml import MAX_YAML_BYTES
     from envs.hand.importing.files import check_files
     from fingers_deploy.files import open_regular
 
+    options.check_directory("-o", args.out)
     if (args.mjcf is None) != (args.drive is None) or (args.mjcf and args.hand):
         found = " ".join(f"--{n}" for n in ("hand", "mjcf", "drive") if vars(args)[n])
         raise InputError("arguments", "", found, "--hand, or --mjcf with --drive")

@@ -10,6 +10,7 @@ from typing import Any
 from envs.config.json_file import read_table
 from envs.errors import InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
+from fingers_mjx.studies.sweep.divergence import trained_anew
 from fingers_mjx.studies.sweep.manifest import Manifest, Member
 
 ALIKE = ("task", "episodes", "seed", "conditions")
@@ -50,6 +51,8 @@ class Results:
         conditions: what all evaluations share.
         chose: configuration to the seeds that chose it, which are in none of the above
             (`fingers_mjx.studies.sweep.promote.choosing`).
+        anew: configuration to the seeds, among those measured, of which a training
+            diverged before the one that counts.
     """
 
     task: str
@@ -59,6 +62,7 @@ class Results:
     missing: tuple[Missing, ...]
     conditions: Mapping[str, Any]
     chose: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
+    anew: Mapping[str, tuple[int, ...]] = field(default_factory=dict)
 
     def seeds(self, configuration: str) -> set[int]:
         """Seeds that the sweep has of a configuration, done or not."""
@@ -104,6 +108,7 @@ def read_results(
             raise InputError(root, "name", name, "the name of a directory")
     values: dict[str, dict[str, dict[int, float]]] = {}
     steps: dict[str, dict[int, int]] = {}
+    anew: dict[str, tuple[int, ...]] = {}
     missing, first = [], None
     for member in manifest.members:
         if member.seed in chose.get(member.configuration, ()):
@@ -119,6 +124,9 @@ def read_results(
             own.setdefault(measure, {})[member.seed] = value
         trained = steps.setdefault(member.configuration, {})
         trained[member.seed] = found["steps_trained"]
+        if trained_anew(member.key.directory(root)):
+            before = anew.get(member.configuration, ())
+            anew[member.configuration] = (*before, member.seed)
     shared = {key: first[1][key] for key in ALIKE} if first else {}
     return Results(
         task=manifest.task,
@@ -128,6 +136,7 @@ def read_results(
         missing=tuple(missing),
         conditions=shared,
         chose=chose,
+        anew=anew,
     )
 
 

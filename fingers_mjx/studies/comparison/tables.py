@@ -106,7 +106,8 @@ def notes(comparison: Comparison) -> list[str]:
     family = f"{together} comparisons read together: p, Holm is corrected for all."
     alone = "One comparison: there is nothing to correct for."
     said = [family if together > 1 else alone]
-    return [*said, *_chose(comparison), *_few(comparison), *_dropped(comparison)]
+    own = (_chose, _anew, _few, _dropped)
+    return said + [sentence for of in own for sentence in of(comparison)]
 
 
 def _chose(comparison: Comparison) -> list[str]:
@@ -114,6 +115,15 @@ def _chose(comparison: Comparison) -> list[str]:
     return [
         f"Left out, since they chose {name}: seeds {_listed(seeds)}."
         for name, seeds in comparison.results.chose.items()
+    ]
+
+
+def _anew(comparison: Comparison) -> list[str]:
+    """Which seeds count although they diverged at first."""
+    return [
+        f"Diverged at first and trained anew, {name}: seeds {_listed(seeds)}; "
+        "an arm that diverges more often is shown at its better ones."
+        for name, seeds in comparison.results.anew.items()
     ]
 
 

@@ -81,14 +81,14 @@ class Book:
         state = {"done": "done", "diverged": "diverged", "failed": "failed"}
         if found.verdict in state:
             self._change(member, state=state[found.verdict], reason=found.reason)
-        elif found.verdict == "full":
+        elif found.verdict in ("full", "anew"):
             self._change(member, state="waiting", reason=found.reason)
         elif stopping:
             self._change(member, state="waiting")
         else:
             self._failures[key] += 1
             again = self._failures[key] <= RETRIES
-            state = "waiting" if again else found.at_last
+            state = "waiting" if again else "failed"
             self._change(member, state=state, reason=found.reason)
 
     def member(self, key: Key) -> Member:

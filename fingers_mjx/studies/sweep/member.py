@@ -15,11 +15,8 @@ from fingers_mjx.ppo.config import free_fields
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.directory import CONFIG_FILE
 from fingers_mjx.runs.setup import overridden, training_env
-from fingers_mjx.studies.sweep.engines.population import (
-    begins_again,
-    most_worlds,
-    shared,
-)
+from fingers_mjx.studies.sweep.divergence import begins_again, set_aside
+from fingers_mjx.studies.sweep.engines.population import most_worlds, shared
 from fingers_mjx.studies.sweep.outcome import is_evaluated
 from fingers_mjx.studies.sweep.plan import Key, Training, assignments, trainings
 from fingers_mjx.studies.sweep.spec import Evaluation, Sweep
@@ -30,8 +27,6 @@ from fingers_mjx.training.train import train_population
 from fingers_mjx.training.watchdog import Watchdog
 
 HANG_FILE = "hang.txt"
-ASIDE = "~diverged"
-"""After the name of a stage, which cannot have it: a training that diverged."""
 
 
 def train_members(
@@ -61,7 +56,7 @@ def train_members(
             before = stages[key][number - 1].path if number else begin
             one = stages[key][number]
             if begins_again(spec, one.path):
-                _set_aside(one.path)
+                set_aside(one.path)
             if key in lost or (start := start_of(one, before)) is None:
                 continue
             group = resumed if start.resume else fresh
@@ -105,13 +100,6 @@ def start_of(training: Training, before: Path | None) -> Start | None:
     if int(saved[-1].name) >= training.setup.train.iterations:
         return None
     return Start(resume=True)
-
-
-def _set_aside(run: Path) -> None:
-    """Renames the directory of a stage that diverged; of several the last is kept."""
-    aside = run.with_name(run.name + ASIDE)
-    shutil.rmtree(aside, ignore_errors=True)
-    run.rename(aside)
 
 
 def evaluate_members(

@@ -12,7 +12,7 @@ from envs.config.json_file import read_table
 from envs.errors import BAD_INPUT, InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.runs.files import OutOfSpace
-from fingers_mjx.studies.sweep.manifest import State
+from fingers_mjx.studies.sweep.divergence import diverged_once
 from fingers_mjx.studies.sweep.plan import LOG_FILE, Key
 from fingers_mjx.training.errors import Diverged, Interrupted
 
@@ -21,7 +21,7 @@ CRASHED = 1
 """Exit status of a worker that met a fault; the others are those of the errors."""
 LOG_BYTES = 1 << 14
 
-Verdict = Literal["done", "again", "failed", "diverged", "full"]
+Verdict = Literal["done", "again", "anew", "failed", "diverged", "full"]
 
 
 @dataclass(frozen=True)
@@ -29,15 +29,14 @@ class Outcome:
     """What became of a member when its worker ended.
 
     Attributes:
-        verdict: "again" is a failure that another attempt may not have; "failed" one
-            that it would have again.
+        verdict: "again" is a failure that another attempt may not have, "failed" one
+            that it would have again; "anew" is a first divergence of a stage where
+            another training of the same seed may do better.
         reason: in one sentence; empty if it is done.
-        at_last: state of a member that has had its last attempt after "again".
     """
 
     verdict: Verdict
     reason: str = ""
-    at_last: State = "failed"
 
 
 def is_evaluated(run: Path) -> bool:
@@ -73,10 +72,11 @@ def outcome(
         return Outcome("done")
     noted = _noted(key.directory(root) / OUTCOME_FILE)
     status, reason = noted.get("status", status), noted.get("reason", "")
-    if status == Diverged.exit_code and not repeatable:
-        return Outcome("again", reason, at_last="diverged")
-    if status == Diverged.exit_code:
+    if status == Diverged.exit_code and repeatable:
         return Outcome("diverged", f"{reason}; the same seed would diverge again")
+    if status == Diverged.exit_code:
+        first = diverged_once(key.directory(root))
+        return Outcome("anew" if first else "diverged", reason)
     if status == BAD_INPUT:
         return Outcome("failed", reason)
     if status == OutOfSpace.exit_code:

@@ -153,8 +153,11 @@ class Sweep:
 
     @property
     def repeatable(self) -> bool:
-        """Whether a seed always trains the same: Warp's sums have no fixed order."""
-        return self.backend != "warp"
+        """Whether a seed always trains the same.
+
+        Sums on a GPU have no fixed order; MJX may run on one, Warp always does.
+        """
+        return self.backend == "cpu"
 
 
 def seed_list(seeds: Seeds, after: int = -1) -> tuple[int, ...]:

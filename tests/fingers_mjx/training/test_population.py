@@ -12,9 +12,9 @@ from support.train_setup import assert_same_end, curve, leaves, overflowing, set
 
 from envs.errors import InputError
 from envs.task import HandSettings
+from fingers_mjx.runs.directory import END_FILE
 from fingers_mjx.runs.metrics import read_metrics
 from fingers_mjx.training.errors import Diverged, Interrupted
-from fingers_mjx.training.member import END_FILE
 from fingers_mjx.training.population import Member, check_population
 from fingers_mjx.training.train import FRESH, Start, train, train_population
 

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fingers_mjx.runs import checkpoint
+from fingers_mjx.studies.sweep.divergence import begins_again
 from fingers_mjx.studies.sweep.engines.engine import (
     Engine,
     Failures,
@@ -15,7 +16,6 @@ from fingers_mjx.studies.sweep.engines.held import gpu_facts
 from fingers_mjx.studies.sweep.engines.process import WORKER
 from fingers_mjx.studies.sweep.plan import Key, Training, keys, trainings
 from fingers_mjx.studies.sweep.spec import Sweep
-from fingers_mjx.training.member import END_FILE
 from fingers_mjx.training.population import program
 
 WORLDS_PER_GIB = 256
@@ -86,19 +86,6 @@ def shared(stages: Sequence[Training]) -> str:
     """
     found = [[one.path.name, program(one.setup)] for one in stages]
     return json.dumps(found, sort_keys=True)
-
-
-def begins_again(spec: Sweep, run: Path) -> bool:
-    """Whether a stage that diverged is trained anew, from where it began.
-
-    Its last checkpoint may be on the way there already: only another training, which
-    Warp gives with the same seed, shows whether the settings are to blame.
-
-    Args:
-        spec: resolved.
-        run: directory of the stage.
-    """
-    return not spec.repeatable and (run / END_FILE).exists()
 
 
 def _reached(spec: Sweep, root: Path, key: Key) -> list[int]:

@@ -1,10 +1,11 @@
 import math
 
 import pytest
-from support.synthetic_sweep import study, write_sweep
+from support.synthetic_sweep import STAGES, study, write_sweep
 
 from envs.errors import InputError
 from fingers_mjx.studies.comparison.comparison import check_complete, compared
+from fingers_mjx.studies.comparison.files import document
 from fingers_mjx.studies.comparison.results import read_results
 from fingers_mjx.studies.comparison.tables import difference_rows, notes
 from fingers_mjx.studies.statistics.compare import ONE_SEED
@@ -140,6 +141,20 @@ def test_nothing_done_is_not_compared(tmp_path):
 def test_one_configuration_cannot_be_compared(tmp_path):
     with pytest.raises(InputError, match="two configurations"):
         compared(results(tmp_path, study({})), "base")
+
+
+def test_seeds_that_were_trained_anew_are_named(tmp_path):
+    """Negative control: what diverged of a member that is missing changes nothing."""
+    path = write_sweep(tmp_path / "s", study({"lift": [0.1] * 5}), curves=False)
+    last = path / "runs/lift/3" / STAGES[-1]
+    last.with_name(f"{last.name}~diverged").mkdir()
+    found = compared(read_results(path, read_manifest(path)), "base", [SPEED])
+    assert found.results.anew == {"lift": (3,)}
+    assert document(found)["trained_anew"] == {"lift": [3]}
+    [sentence] = [note for note in notes(found) if "trained anew" in note]
+    assert "lift: seeds 3" in sentence
+    (last / "eval/summary.json").unlink()
+    assert read_results(path, read_manifest(path)).anew == {}
 
 
 def test_seeds_that_chose_a_configuration_do_not_count_for_it(tmp_path):

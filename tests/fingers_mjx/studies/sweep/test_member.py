@@ -6,17 +6,12 @@ import pytest
 from support.sweep_setup import TINY, sweep
 
 from fingers_mjx.policy.source import PolicySource
-from fingers_mjx.runs.directory import CONFIG_FILE
+from fingers_mjx.runs.directory import CONFIG_FILE, END_FILE
 from fingers_mjx.studies.sweep import member
-from fingers_mjx.studies.sweep.member import (
-    ASIDE,
-    evaluate_members,
-    start_of,
-    train_members,
-)
+from fingers_mjx.studies.sweep.divergence import ASIDE
+from fingers_mjx.studies.sweep.member import evaluate_members, start_of, train_members
 from fingers_mjx.studies.sweep.plan import Key, trainings
 from fingers_mjx.studies.sweep.spec import NAME
-from fingers_mjx.training.member import END_FILE
 from fingers_mjx.training.start import Start
 
 

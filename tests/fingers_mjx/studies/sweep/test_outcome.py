@@ -4,6 +4,8 @@ import json
 
 import pytest
 
+from fingers_mjx.runs.directory import END_FILE
+from fingers_mjx.studies.sweep.divergence import ASIDE
 from fingers_mjx.studies.sweep.outcome import (
     Outcome,
     forget_outcome,
@@ -51,8 +53,13 @@ def test_how_a_worker_ended_decides(tmp_path, run, status, said, verdict, words)
 def test_a_divergence_may_not_come_again_where_trainings_differ(tmp_path, run):
     """Negative control: other failures are what they are everywhere."""
     note_outcome(tmp_path, KEY, 3, "diverged at iteration 7")
+    (run / END_FILE).write_text("{}", "utf-8")
     found = outcome(tmp_path, KEY, run, 3, repeatable=False)
-    assert found == Outcome("again", "diverged at iteration 7", at_last="diverged")
+    assert found == Outcome("anew", "diverged at iteration 7")
+    aside = run.with_name(run.name + ASIDE)
+    aside.mkdir()
+    found = outcome(tmp_path, KEY, run, 3, repeatable=False)
+    assert found == Outcome("diverged", "diverged at iteration 7")
     for status, verdict in ((1, "again"), (2, "failed"), (4, "full")):
         note_outcome(tmp_path, KEY, status, "for a reason")
         both = [outcome(tmp_path, KEY, run, status, same) for same in (True, False)]

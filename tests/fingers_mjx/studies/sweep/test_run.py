@@ -96,7 +96,10 @@ def test_the_same_command_trains_what_is_missing_and_nothing_else(tmp_path):
     [
         ("warp", ["nan"], "done", 2),
         ("warp", ["nan", "nan"], "diverged", 2),
-        ("warp", ["killed", "nan"], "diverged", 2),
+        ("warp", ["killed", "nan"], "done", 3),
+        ("warp", ["nan", "killed"], "done", 3),
+        ("warp", ["nan", "killed", "nan"], "diverged", 3),
+        ("jax", ["nan"], "done", 2),
         ("cpu", ["nan"], "diverged", 1),
     ],
 )

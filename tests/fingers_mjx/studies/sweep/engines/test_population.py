@@ -15,12 +15,12 @@ from support.sweep_setup import (
 from support.sweep_worker import finish
 
 from envs.errors import InputError
+from fingers_mjx.runs.directory import END_FILE
 from fingers_mjx.studies.sweep import worker
 from fingers_mjx.studies.sweep.engines import population as engine
 from fingers_mjx.studies.sweep.engines.population import machine_worlds, population
 from fingers_mjx.studies.sweep.plan import Key, keys, trainings
 from fingers_mjx.studies.sweep.resolve import keep_sweep
-from fingers_mjx.training.member import END_FILE
 
 CONFIGURATIONS = {
     "plain": {},
