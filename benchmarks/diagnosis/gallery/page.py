@@ -8,10 +8,11 @@ import json
 from pathlib import Path
 
 from benchmarks.diagnosis.gallery.__main__ import RECORDS
+from benchmarks.diagnosis.gallery.overview import overview
 from benchmarks.diagnosis.gallery.record import Record
 from envs.config.atomic_file import write_atomic
 
-FOLDER = Path("docs/results/gallery")
+FOLDER, PAGE = Path("docs/results/gallery"), Path("docs/results/gallery.md")
 _LEAST = 0.05
 """Probability below which a hypothesis is not on a page."""
 
@@ -81,16 +82,28 @@ def _named(effects: list[str] | None) -> str:
 
 
 def main() -> int:
-    """Writes a page for every row."""
+    """Writes a page for every row, and the one that gathers them if all are there."""
     parser = argparse.ArgumentParser(description="Write the pages of the gallery.")
     parser.add_argument("rows", type=Path)
-    args = parser.parse_args()
+    rows = read_rows(parser.parse_args().rows)
     FOLDER.mkdir(parents=True, exist_ok=True)
-    for line in args.rows.read_text(encoding="utf-8").splitlines():
-        row = json.loads(line)
+    for row in rows:
         record = RECORDS[row["record"]]
         write_atomic(FOLDER / f"{record.name}.md", page(record, row))
+    if len(rows) < len(RECORDS):
+        print(f"{PAGE} is left as it was: {len(rows)} of {len(RECORDS)} records")
+    else:
+        write_atomic(PAGE, overview(RECORDS, rows))
     return 0
+
+
+def read_rows(path: Path) -> list[dict]:
+    """Returns what the diagnosis said, a row for each record.
+
+    Args:
+        path: that `python -m benchmarks.diagnosis.gallery` wrote.
+    """
+    return [json.loads(row) for row in path.read_text(encoding="utf-8").splitlines()]
 
 
 if __name__ == "__main__":
