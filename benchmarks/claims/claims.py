@@ -1,5 +1,7 @@
 """The paper's comparative claims, and what our seeds say of them by a rule."""
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +11,11 @@ from fingers_mjx.studies.statistics.compare import Difference, difference
 from fingers_mjx.studies.statistics.pairs import pair
 
 SEEDS = 12
-"""Of every configuration; before all of them are there, nothing is concluded."""
+"""Of every configuration, from 0 on; others, if there are any, are in no claim."""
+
+LOST = ("diverged", "failed")
+"""States of members that are left out of their pairs and named: they have no value,
+and will have none."""
 
 WALKS_MPS, WALK = 0.05, 10
 """So many members of `ours` reach this task speed if the budget is not too small."""
@@ -32,6 +38,23 @@ class Claim:
     other: str
     measure: str
     paper: tuple[float, float, float] | None
+
+
+@dataclass(frozen=True)
+class Gap:
+    """A member of a claim without a value.
+
+    Attributes:
+        configuration: by name.
+        seed: of its training.
+        reason: what became of it.
+        lost: whether there will be none; else the claim waits for it.
+    """
+
+    configuration: str
+    seed: int
+    reason: str
+    lost: bool
 
 
 SPEED, FIVE, TILT = (
@@ -73,29 +96,50 @@ the paper finds of the footprint."""
 
 
 def measured(claim: Claim, results: Results) -> Difference:
-    """Returns the difference that a claim is about, paired over seeds.
+    """Returns the difference that a claim is about, paired over the seeds.
 
     Args:
         claim: of two configurations.
         results: of a sweep that has both.
     """
-    empty: dict[str, dict[int, float]] = {}
     ours, other = (
-        results.values.get(name, empty).get(claim.measure, {})
-        for name in (claim.ours, claim.other)
+        _counted(results, name, claim.measure) for name in (claim.ours, claim.other)
     )
     return difference(pair(ours, other))
 
 
-def verdict(claim: Claim, found: Difference, walk: bool) -> str:
+def gaps(claim: Claim, results: Results) -> tuple[Gap, ...]:
+    """Returns the members of a claim that have no value, by seed.
+
+    Args:
+        claim: of two configurations.
+        results: of a sweep that has both.
+    """
+    reasons = {(m.configuration, m.seed): m.reason for m in results.missing}
+    found = []
+    for seed in range(SEEDS):
+        for name in (claim.ours, claim.other):
+            own = _counted(results, name, claim.measure)
+            if seed not in own:
+                reason = reasons.get((name, seed), "not in the sweep")
+                lost = reason.split(" ")[0] in LOST
+                found.append(Gap(name, seed, reason, lost))
+            elif not math.isfinite(own[seed]):
+                reason = f"no episode defines {claim.measure}"
+                found.append(Gap(name, seed, reason, lost=True))
+    return tuple(found)
+
+
+def verdict(claim: Claim, found: Difference, lacks: Sequence[Gap], walk: bool) -> str:
     """Returns "agrees", "disagrees" or why nothing can be said.
 
     Args:
         claim: as the paper has it.
         found: our difference.
+        lacks: its `gaps`.
         walk: whether enough members of `ours` walk: `WALK` of the `walkers`.
     """
-    if found.n < SEEDS:
+    if not all(gap.lost for gap in lacks):
         return f"not yet: {found.n} of {SEEDS} seeds"
     if not walk:
         return "open: the budget is too small"
@@ -115,8 +159,16 @@ def verdict(claim: Claim, found: Difference, walk: bool) -> str:
 def walkers(results: Results) -> tuple[int, int]:
     """Returns how many members of `ours` reach `WALKS_MPS`, and how many there are.
 
+    Both of the first `SEEDS` seeds alone.
+
     Args:
         results: of the ablation.
     """
-    speeds = results.values.get("ours", {}).get(SPEED, {}).values()
+    speeds = _counted(results, "ours", SPEED).values()
     return sum(speed >= WALKS_MPS for speed in speeds), len(speeds)
+
+
+def _counted(results: Results, name: str, measure: str) -> Mapping[int, float]:
+    """Seed to value, of the seeds that claims are about."""
+    own = results.values.get(name, {}).get(measure, {})
+    return {seed: value for seed, value in own.items() if seed in range(SEEDS)}

@@ -1,8 +1,11 @@
-"""Writes the page about the paper's claims from what the sweeps have measured.
+"""Writes the page about the paper's claims, and its picture, from the ablation.
 
 python -m benchmarks.claims.claims_page
 """
 
+import hashlib
+import json
+from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.claims.claims import (
@@ -14,11 +17,14 @@ from benchmarks.claims.claims import (
     WALK,
     WALKS_MPS,
     Claim,
+    Gap,
+    gaps,
     measured,
     verdict,
     walkers,
 )
 from envs.config.atomic_file import write_atomic
+from fingers_deploy.errors import shortened
 from fingers_mjx.studies.comparison.comparison import compared
 from fingers_mjx.studies.comparison.figures import seed_dots
 from fingers_mjx.studies.comparison.results import Results, read_results
@@ -28,6 +34,9 @@ from fingers_mjx.studies.sweep.manifest import read_manifest
 ABLATION = Path("benchmarks/results/ablation")
 PAGE, FIGURE = Path("docs/results/claims.md"), Path("docs/images/ablation.png")
 MEASURES = (SPEED, FIVE, "non_nail_participation", "worst_tip_planting_fraction")
+DIGEST = "values-sha256"
+"""Entry of the picture's metadata: of which values it was made."""
+
 UNITS = {SPEED: (100.0, "cm/s", 2), FIVE: (1.0, "", 2), TILT: (1.0, "°", 1)}
 """Factor, unit and digits of a difference."""
 
@@ -59,7 +68,11 @@ known: the interval is Student's t ([statistics](statistics.md)); a difference a
 its interval lies on the paper's side of zero, and disagrees if it lies on the other; a
 claim of no effect disagrees if the interval does not have zero, and agrees if it has
 zero and nothing as large as 0.79 cm/s, the paper's effect of the footprint. Nothing is
-judged before {seeds} seeds of both are there.
+judged before all {seeds} members of both, the seeds 0 to {last}, are done. Written
+last, also after the first 27 were known: a member that diverged twice, or that failed
+and was not started again, is left out of its pairs and named, and so is one in which no
+episode defines the measure; the other pairs are judged. A member of `ours` that is left
+out counts as one that does not walk.
 
 This is the third budget. Under the first, too small by the same rule, `no_direction`
 was above `ours` (+2.1 cm/s, p = 0.03 after Holm, seven seeds); what became of both is
@@ -96,11 +109,11 @@ def page(results: Results) -> str:
         results: of the ablation.
     """
     walk, ours = walkers(results)
-    found = [(c, measured(c, results)) for c in CLAIMS]
-    said = [(c, d, verdict(c, d, walk >= WALK)) for c, d in found]
-    said.sort(key=lambda row: not row[2].startswith("disagrees"))
-    against = [c.text for c, _, v in said if v == "disagrees"]
-    judged = any(v in ("agrees", "disagrees") for _, _, v in said)
+    found = [(c, measured(c, results), gaps(c, results)) for c in CLAIMS]
+    said = [(*row, verdict(*row, walk >= WALK)) for row in found]
+    said.sort(key=lambda row: row[3] != "disagrees")
+    against = [claim.text for claim, _, _, v in said if v == "disagrees"]
+    judged = any(v in ("agrees", "disagrees") for *_, v in said)
     first = "None is contradicted." if judged else "Nothing is concluded yet."
     if against:
         first = f"**Ours contradicts the paper:** {'; '.join(against)}."
@@ -111,19 +124,26 @@ def page(results: Results) -> str:
         first=f"{first} {so_far}",
         claims="\n".join(rows),
         seeds=SEEDS,
+        last=SEEDS - 1,
         count=results.members - len(results.missing),
         members=results.members,
         arms="\n".join(_arm_row(results, name) for name in results.configurations),
     )
 
 
-def _claim_row(claim: Claim, found: Difference, said: str) -> str:
+def _claim_row(claim: Claim, found: Difference, lacks: Sequence[Gap], said: str) -> str:
     paper = "none" if claim.paper is None else _interval(claim.measure, *claim.paper)
     ours = "–"
     if found.mean is not None and found.low is not None and found.high is not None:
         ours = _interval(claim.measure, found.mean, found.low, found.high)
     pair = f"`{claim.ours}` less `{claim.other}`"
-    return f"| {claim.text} ({pair}) | {paper} | {ours} | {found.n} | {said} |"
+    without = "".join(f"; without {_gap(gap)}" for gap in lacks if gap.lost)
+    return f"| {claim.text} ({pair}) | {paper} | {ours} | {found.n} | {said}{without} |"
+
+
+def _gap(gap: Gap) -> str:
+    reason = shortened(gap.reason, 80).replace("|", "/")
+    return f"seed {gap.seed}: `{gap.configuration}` {reason}"
 
 
 def _interval(measure: str, mean: float, low: float, high: float) -> str:
@@ -143,11 +163,37 @@ def _arm_row(results: Results, name: str) -> str:
     return f"| `{name}` | {', '.join(map(str, seeds))} | {each} | {mean:.3f} |"
 
 
+def digest(results: Results) -> str:
+    """Returns the SHA-256 of the values that the picture shows, of every member.
+
+    Args:
+        results: of the ablation.
+    """
+    values = results.values
+    shown = {
+        f"{name} {measure}": sorted(values.get(name, {}).get(measure, {}).items())
+        for name in results.configurations
+        for measure in MEASURES
+    }
+    return hashlib.sha256(json.dumps(shown).encode()).hexdigest()
+
+
+def draw(results: Results, path: Path) -> None:
+    """Draws the measures of every member, and says in the file of which values.
+
+    Args:
+        results: of the ablation.
+        path: of the picture, a PNG.
+    """
+    figure = seed_dots(compared(results, "ours", MEASURES))
+    figure.savefig(path, dpi=110, metadata={DIGEST: digest(results)})
+
+
 def main() -> int:
-    """Writes the page and its figure."""
+    """Writes the page and its picture."""
     results = read_results(ABLATION, read_manifest(ABLATION))
     write_atomic(PAGE, page(results))
-    seed_dots(compared(results, "ours", MEASURES)).savefig(FIGURE, dpi=110)
+    draw(results, FIGURE)
     return 0
 
 

@@ -4,9 +4,28 @@ from typing import Any
 
 import numpy as np
 import pytest
+from PIL import Image
+from support.synthetic_sweep import write_sweep
 
-from benchmarks.claims.claims import CLAIMS, SEEDS, WALK, measured, verdict, walkers
-from benchmarks.claims.claims_page import ABLATION, PAGE, page
+from benchmarks.claims import claims_page
+from benchmarks.claims.claims import (
+    CLAIMS,
+    SEEDS,
+    WALK,
+    gaps,
+    measured,
+    verdict,
+    walkers,
+)
+from benchmarks.claims.claims_page import (
+    ABLATION,
+    DIGEST,
+    FIGURE,
+    MEASURES,
+    PAGE,
+    digest,
+    page,
+)
 from fingers_mjx.studies.comparison.results import Results, read_results
 from fingers_mjx.studies.sweep.manifest import read_manifest
 
@@ -23,9 +42,32 @@ def made(gain, claim=FASTER, seeds=SEEDS, speed=0.08) -> Results:
     return Results("crawl", tuple(values), values, {}, (), {})
 
 
+def judged(results, claim=FASTER):
+    lacks = gaps(claim, results)
+    return verdict(claim, measured(claim, results), lacks, walkers(results)[0] >= WALK)
+
+
 def said(gain, claim=FASTER, **given):
-    results = made(gain, claim, **given)
-    return verdict(claim, measured(claim, results), walkers(results)[0] >= WALK)
+    return judged(made(gain, claim, **given), claim)
+
+
+def swept(path, gain, states, seeds=SEEDS):
+    """Results of a sweep of two configurations, of which some members are not done."""
+    values = {
+        name: {
+            i: {FASTER.measure: speed + NOISE[i % SEEDS] * share} for i in range(seeds)
+        }
+        for name, speed, share in (
+            ("ours", 0.08, 1.0),
+            ("no_footprint", 0.08 - gain, 1.3),
+        )
+    }
+    write_sweep(path, values, states, curves=False)
+    return read_results(path, read_manifest(path))
+
+
+def row_of(text):
+    return next(x for x in text.splitlines() if x.startswith(f"| {FASTER.text}"))
 
 
 def test_the_page_is_what_the_results_say():
@@ -50,8 +92,7 @@ def test_no_effect_is_one_that_is_surely_small():
     wide = made(0.0, ALIKE)
     other: Any = wide.values[ALIKE.other][ALIKE.measure]
     other.update({i: v + 10 * NOISE[-i] for i, v in other.items()})
-    found = measured(ALIKE, wide)
-    assert verdict(ALIKE, found, True) == "open: the interval is too wide"
+    assert judged(wide, ALIKE) == "open: the interval is too wide"
 
 
 def test_nothing_is_said_before_all_seeds_are_there():
@@ -80,3 +121,83 @@ def test_a_claim_that_is_contradicted_comes_first():
 def test_before_anything_is_judged_the_page_says_so():
     assert "Nothing is concluded yet. Of `ours` 11 of 11" in page(made(0.01, seeds=11))
     assert "None is contradicted." in page(made(0.01))
+
+
+LOST = {
+    ("no_footprint", 3): ("diverged", "loss is not finite | iteration 7"),
+    ("ours", 5): ("failed", "killed by SIGKILL"),
+}
+
+
+def test_members_that_are_lost_are_left_out_and_named(tmp_path):
+    row = row_of(page(swept(tmp_path, 0.01, LOST)))
+    assert "| 10 | agrees; without seed 3: `no_footprint` diverged in walk" in row
+    assert "loss is not finite / iteration 7; without seed 5: `ours` failed" in row
+    assert row.count("|") == 6
+
+
+@pytest.mark.parametrize("state", ["waiting", "running"])
+def test_a_claim_waits_for_members_that_are_not_lost(tmp_path, state):
+    states = {**LOST, ("ours", 7): (state, "")}
+    row = row_of(page(swept(tmp_path, 0.01, states)))
+    assert "| 9 | not yet: 9 of 12 seeds; without seed 3" in row
+    assert "seed 7" not in row
+
+
+def test_a_member_that_is_lost_does_not_walk(tmp_path):
+    lost = {("ours", i): ("diverged", "") for i in range(SEEDS - WALK)}
+    assert judged(swept(tmp_path / "enough", 0.01, lost)) == "agrees"
+    lost["ours", SEEDS - 1] = ("diverged", "")
+    few = swept(tmp_path / "few", 0.01, lost)
+    assert judged(few) == "open: the budget is too small"
+
+
+def test_a_measure_that_no_episode_defines_is_left_out_and_named():
+    results = made(0.01)
+    other: Any = results.values[FASTER.other][FASTER.measure]
+    other[4] = np.nan
+    text = f"seed 4: `no_footprint` no episode defines {FASTER.measure}"
+    assert f"| 11 | agrees; without {text} |" in row_of(page(results))
+
+
+def test_seeds_beyond_the_specification_count_nowhere(tmp_path):
+    """Neither as pairs nor as members that walk, nor does a claim wait for them."""
+    twelve = made(0.01)
+    more = swept(tmp_path, 0.01, {("ours", SEEDS): ("waiting", "")}, seeds=SEEDS + 8)
+    assert walkers(more) == walkers(twelve) == (SEEDS, SEEDS)
+    assert measured(FASTER, more).n == SEEDS
+    assert judged(more) == "agrees"
+    ours: Any = more.values["ours"][FASTER.measure]
+    ours.update(dict.fromkeys(range(SEEDS - WALK + 1), 0.0))
+    assert walkers(more)[0] < WALK
+
+
+def test_the_picture_is_of_the_results():
+    results = read_results(ABLATION, read_manifest(ABLATION))
+    assert stamp(FIGURE) == digest(results)
+    speeds: Any = results.values["no_lift"]["task_speed_mps"]
+    speeds[0] += 1e-9
+    assert stamp(FIGURE) != digest(results)
+
+
+@pytest.mark.parametrize("measure", MEASURES)
+def test_the_stamp_is_of_every_value_that_is_drawn(measure):
+    results = read_results(ABLATION, read_manifest(ABLATION))
+    before = digest(results)
+    values: Any = results.values["no_direction"][measure]
+    values[99] = values.pop(0)
+    assert digest(results) != before
+
+
+def test_one_command_writes_the_page_and_the_picture(tmp_path, monkeypatch):
+    monkeypatch.setattr(claims_page, "PAGE", tmp_path / "page.md")
+    monkeypatch.setattr(claims_page, "FIGURE", tmp_path / "picture.png")
+    assert claims_page.main() == 0
+    assert (tmp_path / "page.md").read_text("utf-8") == PAGE.read_text("utf-8")
+    assert stamp(tmp_path / "picture.png") == stamp(FIGURE)
+
+
+def stamp(path):
+    """Of which values a picture says that it was made."""
+    with Image.open(path) as picture:
+        return picture.info[DIGEST]
