@@ -1,11 +1,13 @@
 """The sweeps that test the paper's claims can begin, and differ in rewards alone."""
 
+import re
 from pathlib import Path
 
 import pytest
 
 from envs.config.typed import load_yaml
-from envs.hand.hand_file import load_hand_file
+from envs.hand.hand_file import hand_yaml, load_hand_file
+from fingers_mjx.cli.main import make_parser
 from fingers_mjx.studies.sweep.resolve import keep_sweep
 from fingers_mjx.studies.sweep.spec import Sweep
 
@@ -20,6 +22,13 @@ MEMBERS = {
     "keyboard_creep": (6, 1),
     "diagnosis_gain": (3, 8),
 }
+HANDS = sorted(CLAIMS.glob("hands/*.yaml"))
+MADE = {
+    "deadband": "sysid diagnose deadband/finger.parquet -o deadband/diagnosis",
+    "deadband_real": "benchmarks.diagnosis.hidden_deadband --out deadband",
+    "weak_finger_real": 'save_hand_file(hand, "weak_finger_real.yaml")',
+}
+"""The command of each hand, at its top."""
 
 
 def swept(name):
@@ -46,6 +55,38 @@ def test_only_the_hand_differs():
             assert (ours.name, ours.where) == (theirs.name, theirs.where)
             for key, size in ours.parameters.items():
                 assert size.value == pytest.approx(theirs.parameters[key].value, 0.02)
+
+
+@pytest.mark.parametrize("file", HANDS, ids=lambda file: file.stem)
+def test_hands_say_what_made_them(file):
+    """Above what was written then, of which nothing was changed by hand."""
+    lines = file.read_text("utf-8").splitlines(keepends=True)
+    head = "".join(line for line in lines if line.startswith("#"))
+    assert re.search(r"at commit [0-9a-f]{7}\b", head)
+    assert MADE[file.stem] in head
+    assert "".join(lines) == head + hand_yaml(load_hand_file(file))
+
+
+@pytest.mark.parametrize("file", HANDS, ids=lambda file: file.stem)
+def test_hands_are_the_default_one_with_one_effect(file):
+    hand, default = load_hand_file(file), load_hand_file()
+    assert len(hand.effects) == 1
+    assert hand.without_effects == default
+    assert hand != default
+
+
+def test_the_rule_of_the_gain_is_in_its_command():
+    """What the specification fixes is what the command asks for, or its default."""
+    readme = (CLAIMS / "README.md").read_text("utf-8")
+    command = re.search(r"^fingers sysid (transfer .*\n.*)\)$", readme, re.MULTILINE)
+    assert command
+    words = command[1].replace("\\\n", "").partition("$(")[0].split()
+    args = make_parser().parse_args(["sysid", *words, "--policies", "a", "b"])
+    assert CLAIMS.parents[1] / args.real == CLAIMS / "hands/deadband_real.yaml"
+    seeds = [int(word) for word in re.findall(r"\b\d\b", command[1].split("$(")[1])]
+    assert seeds == list(range(MEMBERS["diagnosis_gain"][1]))
+    rule = (CLAIMS / "diagnosis_gain.yaml").read_text("utf-8").replace("\n# ", " ")
+    assert f"{args.episodes} episodes of each kind and of {args.steps} control" in rule
 
 
 def test_only_rewards_differ():
