@@ -20,7 +20,7 @@ from brax.training.types import Transition
 from flax import linen
 from jaxtyping import Array, Bool, Float, PRNGKeyArray
 
-from fingers_mjx.ppo.advantages import compute_gae
+from fingers_mjx.ppo.advantages import generalized_advantages
 from fingers_mjx.ppo.config import PpoConfig
 from fingers_mjx.ppo.scalars import PpoScalars
 
@@ -39,9 +39,27 @@ __all__ = [
     "update_normalizer",
 ]
 
+
+def _compute_gae(
+    *,
+    truncation: Float[Array, "t b"],
+    termination: Float[Array, "t b"],
+    rewards: Float[Array, "t b"],
+    values: Float[Array, "t b"],
+    bootstrap_value: Float[Array, " b"],
+    lambda_: Float[Array, ""] | float,
+    discount: Float[Array, ""] | float,
+) -> tuple[Float[Array, "t b"], Float[Array, "t b"]]:
+    """`generalized_advantages` as Brax's loss calls them."""
+    values = jnp.concatenate([values, bootstrap_value[None]])
+    return generalized_advantages(
+        rewards, values, 1.0 - truncation, 1.0 - termination, discount, lambda_
+    )
+
+
 _compute_ppo_loss: Any = FunctionType(
     losses.compute_ppo_loss.__code__,
-    {**vars(losses), "compute_gae": compute_gae},
+    {**vars(losses), "compute_gae": _compute_gae},
     argdefs=losses.compute_ppo_loss.__defaults__,
 )
 """Brax's loss with our advantages; it has no argument for them, and its module stays as
