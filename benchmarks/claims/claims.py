@@ -130,29 +130,29 @@ def gaps(claim: Claim, results: Results) -> tuple[Gap, ...]:
     return tuple(found)
 
 
-def verdict(claim: Claim, found: Difference, lacks: Sequence[Gap], walk: bool) -> str:
+def verdict(claim: Claim, found: Difference, lacks: Sequence[Gap], void: bool) -> str:
     """Returns "agrees", "disagrees" or why nothing can be said.
 
     Args:
         claim: as the paper has it.
         found: our difference.
         lacks: its `gaps`.
-        walk: whether enough members of `ours` walk: `WALK` of the `walkers`.
+        void: whether the budget is `too_small`.
     """
+    if void:
+        return "cannot tell: the budget is too small"
     if not all(gap.lost for gap in lacks):
         return f"not yet: {found.n} of {SEEDS} seeds"
-    if not walk:
-        return "open: the budget is too small"
     if found.low is None or found.high is None:
-        return f"open: {found.note}"
+        return f"cannot tell: {found.note}"
     sign = int(np.sign(found.low)) if found.low * found.high > 0.0 else 0
     if claim.paper is None:
         if sign:
             return "disagrees"
         small = max(-found.low, found.high) < SMALL[claim.measure]
-        return "agrees" if small else "open: the interval is too wide"
+        return "agrees" if small else "cannot tell: the interval is too wide"
     if not sign:
-        return "open: the interval has zero"
+        return "cannot tell: the interval has zero"
     return "agrees" if sign == np.sign(claim.paper[0]) else "disagrees"
 
 
@@ -166,6 +166,17 @@ def walkers(results: Results) -> tuple[int, int]:
     """
     speeds = _counted(results, "ours", SPEED).values()
     return sum(speed >= WALKS_MPS for speed in speeds), len(speeds)
+
+
+def too_small(results: Results) -> bool:
+    """Whether `WALK` members of `ours` do not walk, whatever those to come will do.
+
+    Args:
+        results: of the ablation.
+    """
+    lacks = gaps(Claim("", "ours", "ours", SPEED, None), results)
+    coming = {gap.seed for gap in lacks if not gap.lost}
+    return walkers(results)[0] + len(coming) < WALK
 
 
 def _counted(results: Results, name: str, measure: str) -> Mapping[int, float]:

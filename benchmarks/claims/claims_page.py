@@ -20,6 +20,7 @@ from benchmarks.claims.claims import (
     Gap,
     gaps,
     measured,
+    too_small,
     verdict,
     walkers,
 )
@@ -108,20 +109,14 @@ def page(results: Results) -> str:
     Args:
         results: of the ablation.
     """
-    walk, ours = walkers(results)
+    void = too_small(results)
     found = [(c, measured(c, results), gaps(c, results)) for c in CLAIMS]
-    said = [(*row, verdict(*row, walk >= WALK)) for row in found]
+    said = [(*row, verdict(*row, void)) for row in found]
     said.sort(key=lambda row: row[3] != "disagrees")
-    against = [claim.text for claim, _, _, v in said if v == "disagrees"]
-    judged = any(v in ("agrees", "disagrees") for *_, v in said)
-    first = "None is contradicted." if judged else "Nothing is concluded yet."
-    if against:
-        first = f"**Ours contradicts the paper:** {'; '.join(against)}."
-    so_far = f"Of `ours` {walk} of {ours} seeds reach {WALKS_MPS:g} m/s so far."
     rows = [_claim_row(*row) for row in said]
     rows += [f"| {c} | {p} | not trained yet | 0 | not yet |" for c, p in UNTRAINED]
     return TEXT.format(
-        first=f"{first} {so_far}",
+        first=_first(said, results),
         claims="\n".join(rows),
         seeds=SEEDS,
         last=SEEDS - 1,
@@ -129,6 +124,21 @@ def page(results: Results) -> str:
         members=results.members,
         arms="\n".join(_arm_row(results, name) for name in results.configurations),
     )
+
+
+def _first(said: Sequence[tuple], results: Results) -> str:
+    """What a reader should know before all else."""
+    walk, ours = walkers(results)
+    so_far = f"Of `ours` {walk} of {ours} seeds reach {WALKS_MPS:g} m/s"
+    if too_small(results):
+        void = "**Nothing can be concluded under this budget.**"
+        return f"{void} {so_far}, where {WALK} of {SEEDS} were asked for beforehand."
+    against = [claim.text for claim, _, _, v in said if v == "disagrees"]
+    judged = any(v in ("agrees", "disagrees") for *_, v in said)
+    first = "None is contradicted." if judged else "Nothing is concluded yet."
+    if against:
+        first = f"**Ours contradicts the paper:** {'; '.join(against)}."
+    return f"{first} {so_far} so far."
 
 
 def _claim_row(claim: Claim, found: Difference, lacks: Sequence[Gap], said: str) -> str:
