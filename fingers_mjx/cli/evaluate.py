@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
-from fingers_mjx.cli.machine.jax_ready import prepare_jax
 
 if TYPE_CHECKING:
     from fingers_mjx.runs.setup import Setup
@@ -84,17 +83,16 @@ def run(args: argparse.Namespace) -> int:
 
 def _preview(args: argparse.Namespace) -> str:
     """Returns what would be simulated, as a `config.yaml`."""
-    prepare_jax()
-    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.policy.trained_in import trained_in
     from fingers_mjx.runs.settings import settings_yaml
 
-    return settings_yaml(_setup(args, load_source(args.policy).setup))
+    return settings_yaml(_setup(args, trained_in(args.policy)))
 
 
 def _setup(args: argparse.Namespace, setup: Setup) -> Setup:
     """Returns what is simulated: the policy's own task, changed as asked."""
-    from fingers_mjx.evaluation.source import as_deployed, nominal, with_command
-    from fingers_mjx.runs.setup import overridden
+    from fingers_mjx.evaluation.setups import as_deployed, nominal, with_command
+    from fingers_mjx.runs.settings import overridden
 
     setup = as_deployed(nominal(setup) if args.nominal else setup)
     for command in args.commands or ():

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 
 from envs.errors import InputError, one_of
 from fingers_mjx.cli.arguments import options
-from fingers_mjx.cli.machine.jax_ready import prepare_jax
 from fingers_mjx.cli.play_keys import key_times, keys_asked, keys_named, start_board
 from fingers_mjx.play.sokoban import LEVELS
 
@@ -144,11 +143,10 @@ def run(args: argparse.Namespace) -> int:
 
 def _preview(args: argparse.Namespace) -> str:
     """Returns the settings of the worlds to play in, as a `config.yaml`."""
-    prepare_jax()
-    from fingers_mjx.policy.source import load_source
+    from fingers_mjx.policy.trained_in import trained_in
     from fingers_mjx.runs.settings import settings_yaml
 
-    return settings_yaml(_setup(args, load_source(args.policy).setup))
+    return settings_yaml(_setup(args, trained_in(args.policy)))
 
 
 def _play(args: argparse.Namespace) -> int:
@@ -243,7 +241,7 @@ def _then_name(args: argparse.Namespace) -> str | None:
 
 def _setup(args: argparse.Namespace, trained: Setup) -> Setup:
     """Returns the worlds to play in."""
-    from fingers_mjx.evaluation.source import nominal, with_command, without_practice
+    from fingers_mjx.evaluation.setups import nominal, with_command, without_practice
     from fingers_mjx.runs.settings import overridden
 
     setup = overridden(trained if args.randomize else nominal(trained), args.settings)

@@ -48,7 +48,7 @@ def _check(args: argparse.Namespace) -> None:
 def run(args: argparse.Namespace) -> int:
     """Measures; the tables go to stdout, progress to stderr."""
     from fingers_mjx.cli.output import keep_summary
-    from fingers_mjx.evaluation.source import nominal
+    from fingers_mjx.evaluation.setups import nominal
     from fingers_mjx.evaluation.steering.commands import obeyed
     from fingers_mjx.evaluation.steering.heading_hold import held
     from fingers_mjx.evaluation.steering.worlds import Course

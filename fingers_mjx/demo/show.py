@@ -6,12 +6,8 @@ from pathlib import Path
 
 from fingers_deploy import Bundle
 from fingers_mjx.evaluation.evaluate import EpisodeTable
-from fingers_mjx.evaluation.source import (
-    document,
-    evaluate_source,
-    nominal,
-    write_evaluation,
-)
+from fingers_mjx.evaluation.setups import nominal
+from fingers_mjx.evaluation.source import document, evaluate_source, write_evaluation
 from fingers_mjx.play.episodes import Session, play_episodes, schedule_of
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.video import Film, write_video

@@ -1,7 +1,6 @@
 """Evaluation of a trained policy wherever it is kept, and what is written of it."""
 
-import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -10,11 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from envs.batch import BatchEnv
-from envs.config.settings.keyboard import KeyboardConfig
-from envs.errors import InputError
 from envs.physics.room import ROOM, too_little_room
-from envs.randomize import no_randomization
-from envs.tasks.keyboard.variation import nominal_keyboard
 from fingers_mjx.evaluation.evaluate import (
     Episodes,
     EpisodeTable,
@@ -30,71 +25,20 @@ from fingers_mjx.evaluation.files import (
     write_table,
 )
 from fingers_mjx.evaluation.measures import CONTACT_N
+from fingers_mjx.evaluation.setups import as_deployed as as_deployed
+from fingers_mjx.evaluation.setups import nominal as nominal
+from fingers_mjx.evaluation.setups import with_command as with_command
+from fingers_mjx.evaluation.setups import with_fields
+from fingers_mjx.evaluation.setups import without_practice as without_practice
 from fingers_mjx.policy.actor import acting_together
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures
 from fingers_mjx.reports.page import commit_here
-from fingers_mjx.runs.setup import Setup, make_env
+from fingers_mjx.runs.setup import make_env
 
 MAX_WORLDS = 4096
 GAIT_S = 8.0
 """Stretch of an episode that the gait diagram shows [s]."""
-
-
-def nominal(setup: Setup) -> Setup:
-    """Returns `setup` with the nominal hand, and no noise, not at the start either.
-
-    A keyboard has its nominal parameters, and lies where it should.
-    """
-    calm = no_randomization(setup.hand.tip_friction.value)
-    still: dict[str, Any] = {"reset_joint_rad": 0.0, "reset_speed_mps": 0.0}
-    if isinstance(setup.env, KeyboardConfig):
-        still["keyboard"] = nominal_keyboard()
-    return _with_fields(setup, randomize=calm, **still)
-
-
-def as_deployed(setup: Setup) -> Setup:
-    """Returns `setup` with what the shim does beside the policy.
-
-    Of a recovery it is the end: detector and ramp (`envs.tasks.recovery.settle`). It
-    starts from poses that training has not seen.
-    """
-    return _with_fields(setup, settle=True, falls="held_out")
-
-
-def without_practice(setup: Setup) -> Setup:
-    """Returns `setup` with episodes that all begin as the task says.
-
-    Only training starts from practice poses (`envs.tasks.recovery.practice`).
-    """
-    return _with_fields(setup, practice_fraction=0.0)
-
-
-def with_command(setup: Setup, command: Sequence[float]) -> Setup:
-    """Returns `setup` with one command for all of every episode.
-
-    Args:
-        setup: settings.
-        command: v_x, v_y [m/s] and yaw rate [rad/s], in V.
-
-    Raises:
-        InputError: the task has no commands.
-    """
-    if not hasattr(setup.env, "command"):
-        valid = "no --command: this task has none"
-        raise InputError("--command", "", setup.train.task, valid)
-    ranges = [(float(value), float(value)) for value in command]
-    fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
-    fixed = dict(zip(fields, ranges, strict=True))
-    shares = {f"{kind}_fraction": 0.0 for kind in ("standing", "turning", "straight")}
-    changed = dataclasses.replace(setup.env.command, **fixed, **shares)
-    return _with_fields(setup, command=changed)
-
-
-def _with_fields(setup: Setup, **changes: Any) -> Setup:
-    """Returns `setup` with those of the changes whose fields its task has."""
-    known = {k: v for k, v in changes.items() if hasattr(setup.env, k)}
-    return dataclasses.replace(setup, env=dataclasses.replace(setup.env, **known))
 
 
 def evaluate_source(
@@ -121,7 +65,7 @@ def evaluate_source(
     """
     setup = source.setup
     if steps is not None:
-        setup = _with_fields(setup, episode_s=steps * setup.env.control_dt_s)
+        setup = with_fields(setup, episode_s=steps * setup.env.control_dt_s)
     # What a fallen hand does does not count, so there is no need to set it up again.
     batch = make_env(setup, min(episodes, MAX_WORLDS), backend, auto_reset=False)
     table = evaluate(

@@ -17,7 +17,7 @@ import numpy as np
 from envs.batch import BatchEnv
 from envs.rounding import fix_rounding
 from fingers_mjx.evaluation.record import record
-from fingers_mjx.evaluation.source import nominal, without_practice
+from fingers_mjx.evaluation.setups import nominal, without_practice
 from fingers_mjx.play.keyboard_video import write_keyboard_video
 from fingers_mjx.play.player import Played
 from fingers_mjx.play.video import Film, write_video

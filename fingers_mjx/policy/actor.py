@@ -13,11 +13,11 @@ import numpy as np
 from jax.tree_util import Partial
 from jaxtyping import Array, Float
 
-from envs.errors import InputError
 from fingers_mjx.ppo.members import each, flat, parts, stacked
 from fingers_mjx.ppo.state import TrainState
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.checkpoint import Saved
+from fingers_mjx.runs.intact import newest_at
 
 _POLICY = "train/params/policy/params/"
 _NORMALIZER = "train/normalizer/"
@@ -150,13 +150,7 @@ def read(path: Path, say: Callable[[str], None] = print) -> Saved:
     Raises:
         InputError: if there is none.
     """
-    inside = path / "checkpoints"
-    if not inside.is_dir():
-        return checkpoint.load(path)
-    newest = checkpoint.newest(inside, say)
-    if newest is None:
-        raise InputError(inside, "", "no checkpoint", "a run that has saved one")
-    return checkpoint.load(newest)
+    return checkpoint.load(newest_at(path, say))
 
 
 def warm_started(train: TrainState, saved: Saved) -> TrainState:

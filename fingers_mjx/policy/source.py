@@ -7,24 +7,16 @@ which `config.yaml` and `hand.yaml` say what it was trained in.
 from dataclasses import dataclass
 from pathlib import Path
 
-from envs.errors import InputError
-from fingers_deploy import Bundle, load_bundle
-from fingers_deploy.bundle import check_joint_order
+from fingers_deploy import Bundle
 from fingers_mjx.policy.actor import Network, load_policy
 from fingers_mjx.policy.interface import (
     check_interface,
     check_run_interface,
     interface_of,
 )
-from fingers_mjx.policy.place import check_kind, is_run
-from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
-from fingers_mjx.runs.setup import (
-    Setup,
-    config_digest,
-    load_setup,
-    make_env,
-    run_setup,
-)
+from fingers_mjx.policy.place import is_run
+from fingers_mjx.policy.trained_in import read_bundle
+from fingers_mjx.runs.setup import Setup, make_env, run_setup
 
 
 @dataclass(frozen=True)
@@ -77,18 +69,7 @@ def load_bundle_setup(path: Path) -> tuple[Bundle, Setup]:
             export, or of a task that has changed since.
         BundleError: a bundle that is damaged or made for another hand.
     """
-    check_kind(path)
-    bundle = load_bundle(path)
-    directory = path if path.is_dir() else path.parent
-    found = config_digest(directory)
-    wanted = bundle.manifest.provenance.config_sha256
-    if found != wanted:
-        what = f"{CONFIG_FILE} and {HAND_FILE}"
-        valid = f"the files of this policy's export (SHA-256 {wanted[:12]}…)"
-        raise InputError(directory, what, f"SHA-256 {found[:12]}…", valid)
-    task = bundle.manifest.task
-    setup = load_setup(directory / CONFIG_FILE, directory / HAND_FILE, task)
-    check_joint_order(bundle, setup.hand.nominal.joint_names)
+    bundle, setup = read_bundle(path)
     ours = interface_of(make_env(setup, 1, "cpu"))
     check_interface(bundle.source, bundle.manifest.interface, ours)
     return bundle, setup

@@ -8,7 +8,7 @@ at any moment leaves the checkpoints before it as they were.
 
 import json
 import shutil
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,10 @@ import orbax.checkpoint as ocp
 
 from envs.config.atomic_file import sync
 from envs.config.json_file import read_table
-from envs.errors import InputError
 from fingers_mjx.runs.files import OutOfSpace, room_for
+from fingers_mjx.runs.intact import check
+from fingers_mjx.runs.intact import checkpoints as checkpoints
+from fingers_mjx.runs.intact import newest as newest
 from fingers_mjx.runs.seal import problem, seal
 from fingers_mjx.runs.tree import (
     check_layout,
@@ -116,37 +118,6 @@ def clean(directory: Path) -> None:
             shutil.rmtree(path)
 
 
-def checkpoints(directory: Path) -> list[Path]:
-    """Returns the checkpoints in `directory`, oldest first."""
-    return sorted(p for p in directory.glob("[0-9]" * 8) if p.is_dir())
-
-
-def newest(
-    directory: Path, say: Callable[[str], None], at_most: int | None = None
-) -> Path | None:
-    """Returns the newest checkpoint that is intact; None if none was ever written.
-
-    Args:
-        directory: of all checkpoints of the run.
-        say: called with one sentence for each checkpoint that is passed over.
-        at_most: last iteration that it may be of; any if not given.
-
-    Raises:
-        InputError: if there are checkpoints, but none is intact.
-    """
-    found = checkpoints(directory)
-    if at_most is not None:
-        found = [path for path in found if int(path.name) <= at_most]
-    for path in reversed(found):
-        fault = problem(path, int(path.name))
-        if not fault:
-            return path
-        say(f"checkpoint {path} is damaged ({fault}); trying the one before it")
-    if found:
-        raise InputError(directory, "", "only damaged checkpoints", "an intact one")
-    return None
-
-
 def set_aside(directory: Path, after: int) -> None:
     """Renames checkpoints later than iteration `after`, such as damaged ones.
 
@@ -167,12 +138,7 @@ def load(path: Path) -> Saved:
     Raises:
         InputError: if it is missing, incomplete or altered.
     """
-    if not (path.name.isdigit() and path.is_dir()):
-        found = "another name or no directory"
-        raise InputError(path, "", found, "a checkpoint, checkpoints/NNNNNNNN")
-    fault = problem(path, int(path.name))
-    if fault:
-        raise InputError(path, "", fault, "a complete checkpoint")
+    check(path)
     meta = read_table(path / "meta.json")
     with ocp.PyTreeCheckpointer() as reader:
         stored = reader.restore((path / "state").absolute())

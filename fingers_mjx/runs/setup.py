@@ -1,15 +1,18 @@
 """What a run is made of: settings of learner and task, and the hand.
 
-They come from the command line or from a run directory, and go on to the environment.
+They come from the command line or from a run directory, and go on to the environment;
+JAX loads only where one is made.
 """
+
+from __future__ import annotations
 
 import dataclasses
 import hashlib
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from envs import registry
-from envs.batch import BatchEnv
 from envs.config.strict_yaml import MAX_YAML_BYTES
 from envs.hand.hand_file import DEFAULT_HAND_FILE, HandFile, load_hand_file
 from fingers_deploy.files import read_regular
@@ -18,6 +21,9 @@ from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
 from fingers_mjx.runs.settings import ENV_PREFIX as ENV_PREFIX
 from fingers_mjx.runs.settings import Settings, load_settings, new_settings, run_task
 from fingers_mjx.runs.settings import overridden as overridden
+
+if TYPE_CHECKING:
+    from envs.batch import BatchEnv
 
 
 @dataclass(frozen=True)
@@ -86,6 +92,8 @@ def training_env(setup: Setup, members: int = 1) -> BatchEnv:
     Raises:
         InputError: settings, a hand or a backend with which there is no environment.
     """
+    from envs.batch import BatchEnv
+
     train = setup.train
     worlds = members * train.num_envs
     env = registry.make_env(

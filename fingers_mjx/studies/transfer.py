@@ -19,12 +19,8 @@ from envs.hand.hand_file import HandFile
 from fingers_mjx.evaluation.direction import better
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.measures import steps_alive
-from fingers_mjx.evaluation.source import (
-    evaluate_source,
-    nominal,
-    summary,
-    with_command,
-)
+from fingers_mjx.evaluation.setups import nominal, with_command
+from fingers_mjx.evaluation.source import evaluate_source, summary
 from fingers_mjx.evaluation.stats import paired_difference
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource

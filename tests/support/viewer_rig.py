@@ -6,7 +6,7 @@ from pathlib import Path
 from support.cli_setup import make_bundle, make_setup
 
 from fingers_deploy import load_bundle
-from fingers_mjx.evaluation.source import nominal
+from fingers_mjx.evaluation.setups import nominal
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.viewer.live import Live
 from fingers_mjx.play.viewer.watch import Watched

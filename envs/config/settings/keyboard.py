@@ -12,6 +12,9 @@ from envs.errors import InputError, check_ordered
 if TYPE_CHECKING:
     from rewards import RewardTable
 
+ACTUATION_M = 0.002
+"""Depth at which a key is down by its data sheet [m]."""
+
 
 @dataclass(frozen=True)
 class RequestConfig:
@@ -57,6 +60,12 @@ class KeyboardVariation:
 
     def __post_init__(self) -> None:
         check_ordered(self, "force_scale", "actuation_m")
+
+
+def nominal_keyboard() -> KeyboardVariation:
+    """The keyboard of the data sheet, perfectly aligned."""
+    depth = (ACTUATION_M, ACTUATION_M)
+    return KeyboardVariation((1.0, 1.0), depth, 0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)

@@ -14,11 +14,11 @@ import mujoco
 import numpy as np
 from jaxtyping import Array, Bool, Float
 
+from envs.config.settings.keyboard import ACTUATION_M as ACTUATION_M
 from envs.hand.model import PALM, PAYLOAD
 
 PITCH_M = 0.01905
 TRAVEL_M = 0.004
-ACTUATION_M = 0.002
 RELEASE_M = 0.0004
 """How far a pressed key must rise above its actuation depth to be released."""
 

@@ -10,18 +10,11 @@ from envs.config.settings.keyboard import KeyboardVariation as KeyboardVariation
 from envs.physics.base import ModelFields
 from envs.streams import stream
 from envs.tasks.keyboard.model import (
-    ACTUATION_M,
     FORCE_N,
     KEY_NAMES,
     KEYBOARD,
     key_spring,
 )
-
-
-def nominal_keyboard() -> KeyboardVariation:
-    """The keyboard of the data sheet, perfectly aligned."""
-    depth = (ACTUATION_M, ACTUATION_M)
-    return KeyboardVariation((1.0, 1.0), depth, 0.0, 0.0, 0.0)
 
 
 @flax.struct.dataclass

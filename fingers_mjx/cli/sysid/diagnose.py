@@ -61,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
 def walk_setup(hand: HandFile) -> Setup:
     """Returns the crawl of one hand with every effect of a walk at its identity."""
-    from fingers_mjx.evaluation.source import nominal
+    from fingers_mjx.evaluation.setups import nominal
     from fingers_mjx.ppo.config import preset
     from fingers_mjx.runs.setup import new_setup
     from sysid.walking.hypotheses import whole_hand

@@ -1,5 +1,6 @@
 """What a command does not need is not imported: a mistake is reported at once."""
 
+import shutil
 import subprocess
 import sys
 
@@ -10,6 +11,9 @@ from support.sysid_logs import small_log
 
 from envs.hand.hand_file import DEFAULT_HAND_FILE
 from fingers_mjx.cli.play import CRAWL_POLICY
+from fingers_mjx.runs.directory import open_run, record_run
+from fingers_mjx.runs.seal import seal
+from fingers_mjx.runs.setup import load_setup
 from sysid.logs.read import write_log
 
 HEAVY = ("jax", "brax", "mujoco", "flax", "onnxruntime", "onnx", "scipy", "numpy")
@@ -27,15 +31,21 @@ sys.exit(status)
 
 def run(*argv):
     """Runs a command; returns its status, what it said and what it imported."""
+    return printed(*argv)[1:]
+
+
+def printed(*argv):
+    """As `run`, with what it printed before them."""
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, *argv],
         capture_output=True,
         text=True,
         check=False,
     )
-    loaded = done.stdout.splitlines()[-1].split()
+    *lines, last = done.stdout.splitlines()
+    loaded = last.split()
     assert loaded[0] == "loaded", done.stderr
-    return done.returncode, done.stderr, loaded[1:]
+    return lines, done.returncode, done.stderr, loaded[1:]
 
 
 @pytest.mark.parametrize(
@@ -167,6 +177,61 @@ def test_a_sweep_is_looked_at_without_jax(argv, most, tmp_path, monkeypatch):
     write_sweep(tmp_path / "s", study({"lift": 0.02}, 2))
     status, _, loaded = run(*argv)
     assert status == 0 and set(loaded) <= most
+
+
+def make_policies(path):
+    """Makes runs with and without a checkpoint, and a bundle that was changed."""
+    setup = load_setup(CRAWL_POLICY / "config.yaml", DEFAULT_HAND_FILE, "crawl")
+    shared = {"train": {"task": "crawl"}}
+    for name in ("run", "unsaved"):
+        with open_run(path / name, resume=False) as made:
+            settings = {"train": setup.train, "env": setup.env}
+            record_run(made, settings, shared, setup.hand)
+    (path / "run/checkpoints/00000001").mkdir(parents=True)
+    seal(path / "run/checkpoints/00000001", 1)
+    shutil.copytree(CRAWL_POLICY, path / "changed")
+    with (path / "changed/hand.yaml").open("a") as file:
+        file.write("\n")
+
+
+@pytest.mark.parametrize(
+    ("argv", "shown"),
+    [
+        (["eval", CRAWL], "task: crawl"),
+        (
+            ["eval", "run", "--nominal", "--command", "0", "0", "0.4"],
+            "yaw_rate_rps: [0.4, 0.4]",
+        ),
+        (["eval", f"{CRAWL_POLICY.with_name('recovery')}"], "falls: held_out"),
+        (["play", "--viewer"], "task: crawl"),
+        (["play", "run", "--friction", "0.25"], "tip_friction: [0.25, 0.25]"),
+        (["play", f"{CRAWL_POLICY.with_name('keyboard')}"], "height_m: 0.0"),
+    ],
+)
+def test_a_policys_settings_are_shown_without_jax(argv, shown, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    make_policies(tmp_path)
+    lines, status, said, loaded = printed(*argv, "--dry-run")
+    assert (status, said) == (0, "") and set(loaded) <= {"numpy"}
+    assert shown in map(str.strip, lines)
+
+
+@pytest.mark.parametrize("command", ["eval", "play"])
+@pytest.mark.parametrize(
+    ("policy", "sentence"),
+    [
+        ("unsaved", "unsaved/checkpoints: found no checkpoint"),
+        ("changed", "valid: the files of this policy's export"),
+    ],
+)
+def test_settings_of_what_is_no_whole_policy_are_not_shown(
+    command, policy, sentence, tmp_path, monkeypatch
+):
+    monkeypatch.chdir(tmp_path)
+    make_policies(tmp_path)
+    status, said, loaded = run(command, policy, "--dry-run")
+    assert status == 2 and set(loaded) <= {"numpy"}
+    assert said.startswith("fingers: ") and sentence in said
 
 
 def test_a_command_that_computes_imports_jax(tmp_path, monkeypatch):

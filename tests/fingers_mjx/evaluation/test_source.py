@@ -4,22 +4,15 @@ import dataclasses
 from pathlib import Path
 from types import SimpleNamespace
 
-import jax
 import numpy as np
 import pytest
 from support.cli_setup import make_setup
 
-from envs.commands import sample_command
 from envs.errors import InputError
 from fingers_mjx.evaluation import source as module
 from fingers_mjx.evaluation.evaluate import EpisodeTable
 from fingers_mjx.evaluation.record import Trace
-from fingers_mjx.evaluation.source import (
-    evaluate_source,
-    nominal,
-    typical_episode,
-    with_command,
-)
+from fingers_mjx.evaluation.source import evaluate_source, typical_episode
 from fingers_mjx.policy.place import check_policy_settings
 from fingers_mjx.policy.source import PolicySource
 
@@ -42,25 +35,6 @@ def table(duration, speed):
 )
 def test_the_episode_shown_is_the_median_of_the_longest(duration, speed, shown):
     assert typical_episode(table(duration, speed)) == shown
-
-
-def test_one_command_leaves_nothing_to_chance():
-    command = with_command(make_setup(), (0.1, -0.05, 0.3)).env.command
-    for seed in range(20):
-        drawn = sample_command(jax.random.key(seed), command)
-        np.testing.assert_allclose(drawn, [0.1, -0.05, 0.3], atol=1e-7)
-
-
-def test_the_nominal_hand_has_neither_spread_nor_noise():
-    env = nominal(make_setup()).env
-    ranges = vars(env.randomize)
-    assert ranges["tip_friction"] == (0.88, 0.88)
-    scales = {name for name in ranges if name.endswith("_scale")}
-    assert scales > {"gain_scale", "payload_mass_scale"}
-    assert {ranges[name] for name in scales} == {(1.0, 1.0)}
-    zero = [ranges[name] for name in sorted(set(ranges) - scales - {"tip_friction"})]
-    assert all(np.all(np.array(value) == 0.0) for value in zero), ranges
-    assert (env.reset_joint_rad, env.reset_speed_mps) == (0.0, 0.0)
 
 
 def test_settings_of_the_learner_are_refused():

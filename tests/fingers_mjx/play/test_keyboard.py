@@ -16,7 +16,7 @@ from envs.tasks.keyboard.model import KEY_NAMES
 from envs.tasks.keyboard.stance import JOINTS
 from fingers_deploy import load_bundle
 from fingers_mjx.cli.play_keys import key_times, keys_asked, start_board
-from fingers_mjx.evaluation.source import nominal
+from fingers_mjx.evaluation.setups import nominal
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.keyboard import KeyPlayer, KeysPlayed, boards_of, keys_story
 from fingers_mjx.play.keyboard_video import write_keyboard_video

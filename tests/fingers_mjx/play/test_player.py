@@ -10,7 +10,7 @@ from support.cli_setup import make_bundle, make_setup, random_weights
 
 from envs.commands import CommandConfig
 from fingers_deploy import BundleError, load_bundle
-from fingers_mjx.evaluation.source import nominal, with_command
+from fingers_mjx.evaluation.setups import nominal, with_command
 from fingers_mjx.play.episodes import play_episodes, schedule_of
 from fingers_mjx.play.player import Player, varied_model
 from fingers_mjx.play.video import frame_steps

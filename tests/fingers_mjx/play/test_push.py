@@ -8,7 +8,7 @@ import pytest
 from support.cli_setup import TRAIN, make_bundle, random_weights
 
 from fingers_deploy import load_bundle
-from fingers_mjx.evaluation.source import with_command
+from fingers_mjx.evaluation.setups import with_command
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
 from fingers_mjx.runs.setup import make_env, new_setup

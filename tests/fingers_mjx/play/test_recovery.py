@@ -13,7 +13,7 @@ from envs.tasks.recovery.falls import Falls
 from fingers_deploy import PolicyController, load_bundle
 from fingers_deploy.rotations import gravity
 from fingers_mjx.cli.main import main
-from fingers_mjx.evaluation.source import as_deployed, nominal
+from fingers_mjx.evaluation.setups import as_deployed, nominal
 from fingers_mjx.play.behaviours import Behaviours, orientation_of, sticks_for
 from fingers_mjx.play.episodes import play_episodes
 from fingers_mjx.play.player import Player
