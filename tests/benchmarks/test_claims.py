@@ -21,6 +21,7 @@ MEMBERS = {
     "push_effort": (2, 1),
     "keyboard_creep": (6, 1),
     "diagnosis_gain": (3, 8),
+    "budget_fourth": (2, 6),
 }
 HANDS = sorted(CLAIMS.glob("hands/*.yaml"))
 MADE = {
@@ -41,6 +42,18 @@ def test_the_sweeps_can_begin(tmp_path, name):
     made = keep_sweep(swept(name), CLAIMS / f"{name}.yaml", tmp_path)
     configurations, seeds = MEMBERS[name]
     assert (len(made.configurations), len(made.seeds)) == (configurations, seeds)
+
+
+def test_the_fourth_budget_differs_in_what_it_names():
+    spec, before = swept("budget_fourth"), swept("ablation")
+    assert dict(spec.set) == dict(before.set)
+    assert spec.evaluate == before.evaluate
+    assert spec.configurations == {
+        "more_worlds": {"num_envs": 2 * int(before.set["num_envs"])},
+        "less_noise": {"ppo.entropy_cost": 0.001},
+    }
+    assert spec.seeds == swept("budget").seeds
+    assert min(spec.seeds) >= before.seeds
 
 
 def test_only_the_hand_differs():
