@@ -140,19 +140,19 @@ def verdict(claim: Claim, found: Difference, lacks: Sequence[Gap], void: bool) -
         void: whether the budget is `too_small`.
     """
     if void:
-        return "cannot tell: the budget is too small"
+        return "undecided: the budget is too small"
     if not all(gap.lost for gap in lacks):
         return f"not yet: {found.n} of {SEEDS} seeds"
     if found.low is None or found.high is None:
-        return f"cannot tell: {found.note}"
+        return f"undecided: {found.note}"
     sign = int(np.sign(found.low)) if found.low * found.high > 0.0 else 0
     if claim.paper is None:
         if sign:
             return "disagrees"
         small = max(-found.low, found.high) < SMALL[claim.measure]
-        return "agrees" if small else "cannot tell: the interval is too wide"
+        return "agrees" if small else "undecided: the interval is too wide"
     if not sign:
-        return "cannot tell: the interval has zero"
+        return "undecided: the interval has zero"
     return "agrees" if sign == np.sign(claim.paper[0]) else "disagrees"
 
 

@@ -81,7 +81,7 @@ def test_the_page_is_what_the_results_say():
 
 @pytest.mark.parametrize(
     ("gain", "answer"),
-    [(0.01, "agrees"), (-0.01, "disagrees"), (0.0, "cannot tell: the interval has")],
+    [(0.01, "agrees"), (-0.01, "disagrees"), (0.0, "undecided: the interval has")],
 )
 def test_a_difference_is_on_one_side_of_zero(gain, answer):
     assert said(gain).startswith(answer)
@@ -93,7 +93,7 @@ def test_no_effect_is_one_that_is_surely_small():
     wide = made(0.0, ALIKE)
     other: Any = wide.values[ALIKE.other][ALIKE.measure]
     other.update({i: v + 10 * NOISE[-i] for i, v in other.items()})
-    assert judged(wide, ALIKE) == "cannot tell: the interval is too wide"
+    assert judged(wide, ALIKE) == "undecided: the interval is too wide"
 
 
 def test_nothing_is_said_before_all_seeds_are_there():
@@ -103,7 +103,7 @@ def test_nothing_is_said_before_all_seeds_are_there():
 
 
 def test_nothing_is_said_where_ours_stands():
-    assert said(0.01, speed=0.03) == "cannot tell: the budget is too small"
+    assert said(0.01, speed=0.03) == "undecided: the budget is too small"
     results = made(0.01)
     ours: Any = results.values["ours"]["task_speed_mps"]
     ours.update(dict.fromkeys(range(SEEDS - WALK + 1), 0.0))
@@ -123,7 +123,7 @@ def test_a_budget_is_too_small_as_soon_as_nothing_can_change_it():
     assert not too_small(results)
     ours[2] = 0.0
     assert too_small(results)
-    assert judged(results) == "cannot tell: the budget is too small"
+    assert judged(results) == "undecided: the budget is too small"
 
 
 def test_a_claim_that_is_contradicted_comes_first():
@@ -164,7 +164,7 @@ def test_a_member_that_is_lost_does_not_walk(tmp_path):
     assert judged(swept(tmp_path / "enough", 0.01, lost)) == "agrees"
     lost["ours", SEEDS - 1] = ("diverged", "")
     few = swept(tmp_path / "few", 0.01, lost)
-    assert judged(few) == "cannot tell: the budget is too small"
+    assert judged(few) == "undecided: the budget is too small"
 
 
 def test_a_measure_that_no_episode_defines_is_left_out_and_named():
