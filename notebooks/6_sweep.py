@@ -179,7 +179,10 @@ figure
 # ## A sweep that was trained
 #
 # `benchmarks/claims/ablation.yaml` takes terms out of the reward of crawling. Each dot
-# is one training of 147 M control steps, evaluated in 256 randomized episodes.
+# is one training of 147 M control steps, evaluated in 256 randomized episodes. Before
+# it was trained, a rule was written down: if fewer than ten of the twelve of `ours` walk
+# at 0.05 m/s, so short a training shows who finds a gait early rather than whose gait is
+# better, and nothing is concluded.
 
 # %%
 TREE = Path(fingers_mjx.__file__).parent.parent
@@ -190,6 +193,9 @@ if ABLATION.exists():
     results = read_results(ABLATION, read_manifest(ABLATION))
     trained_ones = compared(results, "ours", MEASURES)
     print(f"{results.members - len(results.missing)} of {results.members} members")
+    speeds = list(results.values["ours"]["task_speed_mps"].values())
+    walking = sum(speed >= 0.05 for speed in speeds)
+    print(f"{walking} of {len(speeds)} of `ours` walk: ten of twelve were asked for")
     figure = seed_dots(trained_ones)
 figure
 
