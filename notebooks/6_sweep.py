@@ -179,10 +179,10 @@ figure
 # ## A sweep that was trained
 #
 # `benchmarks/claims/ablation.yaml` takes terms out of the reward of crawling. Each dot
-# is one training of 147 M control steps, evaluated in 256 randomized episodes. Before
-# it was trained, a rule was written down: if fewer than ten of the twelve of `ours` walk
-# at 0.05 m/s, so short a training shows who finds a gait early rather than whose gait is
-# better, and nothing is concluded.
+# is one training of 147 M control steps, evaluated in 256 randomized episodes. A rule
+# was written down before: if fewer than ten of the twelve of `ours` walk at 0.05 m/s,
+# so short a training shows who finds a gait early rather than whose gait is better, and
+# nothing is concluded.
 
 # %%
 TREE = Path(fingers_mjx.__file__).parent.parent
