@@ -18,7 +18,6 @@ import math
 import multiprocessing
 import os
 import time
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
@@ -236,22 +235,18 @@ def run_all(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
     done = {row.seed: row for row in map(Row.from_json, lines)}
     missing = [task for task in tasks if task.seed not in done]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
-    pool = ProcessPoolExecutor(
-        workers,
-        mp_context=multiprocessing.get_context("spawn"),
-        initializer=_take_core,
-        max_tasks_per_child=RECORDS_OF_A_PROCESS,
-    )
+    numbers = {task.seed: task.number for task in missing}
+    spawn = multiprocessing.get_context("spawn")
+    # An executor with as few tasks for a child waits for ever when one has done them.
+    pool = spawn.Pool(workers, _take_core, maxtasksperchild=RECORDS_OF_A_PROCESS)
     with pool, open(file, "a") as f:
-        jobs = {pool.submit(run_task, task): task for task in missing}
-        for job in as_completed(jobs):
-            row = job.result()
+        for row in pool.imap_unordered(run_task, missing):
             done[row.seed] = row
             f.write(row.to_json() + "\n")
             f.flush()
             hidden = "+".join(row.effects) or "none"
             print(
-                f"{jobs[job].number:4d} {row.kind:9s} {hidden} ({row.magnitude} "
+                f"{numbers[row.seed]:4d} {row.kind:9s} {hidden} ({row.magnitude} "
                 f"{row.ratio:.2f}) -> {row.verdict} {'+'.join(row.causes)} "
                 f"| {', '.join(row.alternatives)} {row.note} {row.runtime_s:.0f} s",
                 flush=True,
