@@ -201,11 +201,11 @@ def test_what_is_raised_is_a_row(monkeypatch):
 
 def test_a_process_that_has_done_its_records_is_replaced(tmp_path, monkeypatch):
     """One worker alone stood still after a dozen records; what is done stays done."""
-    monkeypatch.setattr(battery, "RECORDS_OF_A_PROCESS", 1)
-    tasks = [replace(t, effects=("no_such",)) for t in plan.plan(5, 3)]
+    monkeypatch.setattr(battery, "RECORDS_OF_A_PROCESS", 2)
+    tasks = [replace(t, effects=("no_such",)) for t in plan.plan(5, 5)]
     rows = battery.run_all(tasks, 1, tmp_path, "rows.jsonl")
-    assert [row.verdict for row in rows] == ["error"] * 3
-    assert len({row.seed for row in rows}) == 3
+    assert [row.verdict for row in rows] == ["error"] * 5
+    assert len({row.seed for row in rows}) == 5
     before = (tmp_path / "rows.jsonl").read_text()
     assert battery.run_all(tasks, 1, tmp_path, "rows.jsonl") == rows
     assert (tmp_path / "rows.jsonl").read_text() == before
