@@ -19,7 +19,7 @@ HAS_RAY = importlib.util.find_spec("ray") is not None
 
 def run_on_two_nodes(root):
     """Runs a sweep on a cluster, in a process of its own."""
-    here = Path(__file__).parents[4]
+    here = Path(__file__).parents[5]
     path = os.pathsep.join(map(str, (here, here / "tests", here / "deploy")))
     command = [sys.executable, sweep_setup.__file__, str(root), "ray"]
     # Other tests beside this one may keep the cores busy while the nodes start.
