@@ -115,19 +115,22 @@ def gaps(claim: Claim, results: Results) -> tuple[Gap, ...]:
         claim: of two configurations.
         results: of a sweep that has both.
     """
-    reasons = {(m.configuration, m.seed): m.reason for m in results.missing}
-    found = []
-    for seed in range(SEEDS):
-        for name in (claim.ours, claim.other):
-            own = _counted(results, name, claim.measure)
-            if seed not in own:
-                reason = reasons.get((name, seed), "not in the sweep")
-                lost = reason.split(" ")[0] in LOST
-                found.append(Gap(name, seed, reason, lost))
-            elif not math.isfinite(own[seed]):
-                reason = f"no episode defines {claim.measure}"
-                found.append(Gap(name, seed, reason, lost=True))
-    return tuple(found)
+    pairs = [(s, name) for s in range(SEEDS) for name in (claim.ours, claim.other)]
+    found = [_gap(results, name, seed, claim.measure) for seed, name in pairs]
+    return tuple(gap for gap in found if gap is not None)
+
+
+def _gap(results: Results, name: str, seed: int, measure: str) -> Gap | None:
+    """Why a member has no value; None if it has one."""
+    own = _counted(results, name, measure)
+    if math.isfinite(own.get(seed, math.nan)):
+        return None
+    if seed in own:
+        return Gap(name, seed, f"no episode defines {measure}", lost=True)
+    for lacks in results.missing:
+        if (lacks.configuration, lacks.seed) == (name, seed):
+            return Gap(name, seed, lacks.reason, lost=lacks.state in LOST)
+    return Gap(name, seed, "not in the sweep", lost=False)
 
 
 def verdict(claim: Claim, found: Difference, lacks: Sequence[Gap], void: bool) -> str:
@@ -174,8 +177,8 @@ def too_small(results: Results) -> bool:
     Args:
         results: of the ablation.
     """
-    lacks = gaps(Claim("", "ours", "ours", SPEED, None), results)
-    coming = {gap.seed for gap in lacks if not gap.lost}
+    gaps_of_ours = [_gap(results, "ours", seed, SPEED) for seed in range(SEEDS)]
+    coming = [gap for gap in gaps_of_ours if gap and not gap.lost]
     return walkers(results)[0] + len(coming) < WALK
 
 

@@ -25,7 +25,7 @@ from PIL import Image
 from benchmarks.speed.browser import Tab, opened
 from envs.rounding import fix_rounding
 from fingers_mjx.demo.demo import POLICY_DIR
-from fingers_mjx.evaluation.source import nominal, without_practice
+from fingers_mjx.evaluation.setups import nominal, without_practice
 from fingers_mjx.play.player import Player
 from fingers_mjx.play.viewer.live import Live
 from fingers_mjx.play.viewer.page import Page, serving

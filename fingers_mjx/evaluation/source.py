@@ -25,11 +25,7 @@ from fingers_mjx.evaluation.files import (
     write_table,
 )
 from fingers_mjx.evaluation.measures import CONTACT_N
-from fingers_mjx.evaluation.setups import as_deployed as as_deployed
-from fingers_mjx.evaluation.setups import nominal as nominal
-from fingers_mjx.evaluation.setups import with_command as with_command
 from fingers_mjx.evaluation.setups import with_fields
-from fingers_mjx.evaluation.setups import without_practice as without_practice
 from fingers_mjx.policy.actor import acting_together
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures

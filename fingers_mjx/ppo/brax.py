@@ -62,6 +62,7 @@ _compute_ppo_loss: Any = FunctionType(
     {**vars(losses), "compute_gae": _compute_gae},
     argdefs=losses.compute_ppo_loss.__defaults__,
 )
+_compute_ppo_loss.__kwdefaults__ = losses.compute_ppo_loss.__kwdefaults__
 """Brax's loss with our advantages; it has no argument for them, and its module stays as
 it is for whoever else imports it."""
 

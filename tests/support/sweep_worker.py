@@ -73,7 +73,7 @@ def train(root, name, seed):
     member = f"{name}/{seed}"
     run, wrong = root / "runs" / member / STAGE, fault(root, member)
     (run.parent / "outcome.json").unlink(missing_ok=True)
-    if (run / "diverged.json").exists():  # only on Warp is it begun again
+    if (run / "diverged.json").exists():  # begun again, as on a GPU
         run.rename(run.with_name(f"{STAGE}~diverged"))
     curve(run, 2)
     match wrong:

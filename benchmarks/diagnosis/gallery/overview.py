@@ -97,7 +97,8 @@ def overview(records: Mapping[str, Record], rows: Sequence[dict]) -> str:
     for half in ("first", "second"):
         own = [(r, row) for row in rows if (r := records[row["record"]]).half == half]
         found[half], found[f"{half}_table"] = _counts(own), _table(own)
-        found["beside"] = _beside(own)
+        if half == "second":
+            found["beside"] = _beside(own)
     return TEXT.format(rows="benchmarks/results/gallery.jsonl", **found)
 
 

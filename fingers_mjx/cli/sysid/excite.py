@@ -18,7 +18,7 @@ def add(actions) -> None:
         "with what every part is for, the limits that the model keeps under it, and "
         "which effects it can show and distinguish.",
     )
-    parser.set_defaults(check=records.check_mechanism)
+    parser.set_defaults(check=records.check_arguments)
     records.mechanism(parser)
     parser.add_argument(
         "--joints",

@@ -36,13 +36,13 @@ def check(args: argparse.Namespace) -> None:
             be large.
 
     Raises:
-        InputError: as `check_mechanism` and `read`.
+        InputError: as `check_arguments` and `read`.
     """
-    check_mechanism(args)
+    check_arguments(args)
     args.records = read(args.logs, args.map)
 
 
-def check_mechanism(args: argparse.Namespace) -> None:
+def check_arguments(args: argparse.Namespace) -> None:
     """Refuses files that name no mechanism, and where nothing can be written.
 
     That is before JAX loads. What an MJCF compiles to and what its drives are is found
@@ -88,7 +88,7 @@ def read(paths: list[Path], map_file: Path | None) -> list[MeasuredLog]:
 
 
 def mechanism_of(args: argparse.Namespace) -> Mechanism:
-    """Returns the mechanism that the arguments name, which `check_mechanism` let pass.
+    """Returns the mechanism that the arguments name, which `check_arguments` let pass.
 
     Raises:
         InputError: files that are no mechanism.

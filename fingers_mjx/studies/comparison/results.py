@@ -1,7 +1,7 @@
 """What a sweep has measured: one value for each member and measure, and what lacks."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from types import MappingProxyType
@@ -11,10 +11,13 @@ from envs.config.json_file import read_table
 from envs.errors import InputError
 from fingers_mjx.evaluation.files import SUMMARY_FILE
 from fingers_mjx.studies.sweep.divergence import trained_anew
-from fingers_mjx.studies.sweep.manifest import Manifest, Member
+from fingers_mjx.studies.sweep.manifest import Manifest, Member, State
 
 ALIKE = ("task", "episodes", "seed", "conditions")
 """What evaluations must share to be compared."""
+
+Evaluated = tuple[Member, dict[str, Any]]
+"""A member with its summary."""
 
 
 @dataclass(frozen=True)
@@ -25,11 +28,13 @@ class Missing:
         configuration: by name.
         seed: of its training.
         reason: what became of it.
+        state: of the member in the manifest.
     """
 
     configuration: str
     seed: int
     reason: str
+    state: State
 
     @property
     def name(self) -> str:
@@ -103,41 +108,60 @@ def read_results(
         InputError: a name that is no name of a directory, or evaluations that were made
             in different ways, such as with other numbers of episodes.
     """
-    for name in (*manifest.configurations, *manifest.stages):
-        if PurePath(name).name != name:
-            raise InputError(root, "name", name, "the name of a directory")
-    values: dict[str, dict[str, dict[int, float]]] = {}
+    _check_names(root, manifest)
+    found, missing = _evaluations(root, manifest, chose)
+    for other in found[1:]:
+        _check_alike(root, found[0], other)
     steps: dict[str, dict[int, int]] = {}
     anew: dict[str, tuple[int, ...]] = {}
-    missing, first = [], None
-    for member in manifest.members:
-        if member.seed in chose.get(member.configuration, ()):
-            continue
-        found = _summary(root, manifest, member)
-        if isinstance(found, str):
-            missing.append(Missing(member.configuration, member.seed, found))
-            continue
-        first = first or (member, found)
-        _check_alike(root, first, (member, found))
-        own = values.setdefault(member.configuration, {})
-        for measure, value in found["measures"].items():
-            own.setdefault(measure, {})[member.seed] = value
-        trained = steps.setdefault(member.configuration, {})
-        trained[member.seed] = found["steps_trained"]
+    for member, summary in found:
+        name, seed = member.key
+        steps.setdefault(name, {})[seed] = summary["steps_trained"]
         if trained_anew(member.key.directory(root)):
-            before = anew.get(member.configuration, ())
-            anew[member.configuration] = (*before, member.seed)
-    shared = {key: first[1][key] for key in ALIKE} if first else {}
+            anew[name] = (*anew.get(name, ()), seed)
     return Results(
         task=manifest.task,
         configurations=manifest.configurations,
-        values=values,
+        values=_values(found),
         steps=steps,
         missing=tuple(missing),
-        conditions=shared,
+        conditions={key: found[0][1][key] for key in ALIKE} if found else {},
         chose=chose,
         anew=anew,
     )
+
+
+def _check_names(root: Path, manifest: Manifest) -> None:
+    """Raises InputError for a name that would lead out of the sweep."""
+    for name in (*manifest.configurations, *manifest.stages):
+        if PurePath(name).name != name:
+            raise InputError(root, "name", name, "the name of a directory")
+
+
+def _evaluations(
+    root: Path, manifest: Manifest, chose: Mapping[str, tuple[int, ...]]
+) -> tuple[list[Evaluated], list[Missing]]:
+    """Returns the members that have an evaluation with it, and those that have none."""
+    found, missing = [], []
+    for member in manifest.members:
+        if member.seed in chose.get(member.configuration, ()):
+            continue
+        summary = _summary(root, manifest, member)
+        if isinstance(summary, str):
+            missing.append(Missing(*member.key, summary, member.state))
+        else:
+            found.append((member, summary))
+    return found, missing
+
+
+def _values(found: Sequence[Evaluated]) -> dict[str, dict[str, dict[int, float]]]:
+    """Returns configuration, measure and seed to the mean over episodes."""
+    values: dict[str, dict[str, dict[int, float]]] = {}
+    for member, summary in found:
+        own = values.setdefault(member.configuration, {})
+        for measure, value in summary["measures"].items():
+            own.setdefault(measure, {})[member.seed] = value
+    return values
 
 
 def _summary(root: Path, manifest: Manifest, member: Member) -> dict[str, Any] | str:
@@ -163,9 +187,7 @@ def _number(value: float | None) -> float:
     return math.nan if value is None else float(value)
 
 
-def _check_alike(
-    root: Path, first: tuple[Member, dict], other: tuple[Member, dict]
-) -> None:
+def _check_alike(root: Path, first: Evaluated, other: Evaluated) -> None:
     """Raises InputError where two evaluations cannot be compared."""
     for key in ALIKE:
         if first[1][key] != other[1][key]:

@@ -139,7 +139,7 @@ def _few(comparison: Comparison) -> list[str]:
 
 def _dropped(comparison: Comparison) -> list[str]:
     """Which seeds are left out, and why."""
-    said = [f"Missing: {m.name}, {m.reason}." for m in comparison.missing]
+    said = _missing(comparison)
     if comparison.missing:
         text = "Their seeds are left out of both arms, which favours what fails often"
         said.append(
@@ -155,6 +155,17 @@ def _dropped(comparison: Comparison) -> list[str]:
     if undefined:
         said.append(f"Undefined in all episodes, left out: {_listed(undefined)}.")
     return said
+
+
+def _missing(comparison: Comparison) -> list[str]:
+    """A sentence for each configuration and reason: many members may just wait."""
+    seeds: dict[tuple[str, str], list[str]] = {}
+    for lost in comparison.missing:
+        seeds.setdefault((lost.configuration, lost.reason), []).append(str(lost.seed))
+    return [
+        f"Missing: {name}/{', '.join(of)}, {reason}."
+        for (name, reason), of in seeds.items()
+    ]
 
 
 def _alone(comparison: Comparison) -> list[str]:

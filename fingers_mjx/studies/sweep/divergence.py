@@ -1,4 +1,4 @@
-"""Trainings that diverged on Warp, where another one of the same seed may not."""
+"""Trainings that diverged where another one of the same seed may not: on a GPU."""
 
 import shutil
 from pathlib import Path
@@ -14,7 +14,7 @@ def begins_again(spec: Sweep, run: Path) -> bool:
     """Whether a stage that diverged is trained anew, from where it began.
 
     Its last checkpoint may be on the way there already: only another training, which
-    Warp gives with the same seed, shows whether the settings are to blame.
+    the same seed gives on a GPU, shows whether the settings are to blame.
 
     Args:
         spec: resolved.

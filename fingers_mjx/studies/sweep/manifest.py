@@ -27,7 +27,7 @@ class Member:
         configuration: its name.
         seed: of its trainings.
         state: "diverged" is not trained again: the same seed diverges again, or has
-            done so on Warp.
+            done so on a GPU.
         reason: why it failed or diverged; of a member that waits, why it does again.
         attempts: how often it was started.
         stage: the one reached.

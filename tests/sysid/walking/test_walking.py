@@ -14,7 +14,7 @@ from envs.errors import InputError
 from envs.hand.hand_file import load_hand_file, save_hand_file
 from fingers_mjx.cli.main import main
 from fingers_mjx.cli.sysid.diagnose import walk_setup
-from fingers_mjx.evaluation.source import nominal
+from fingers_mjx.evaluation.setups import nominal
 from fingers_mjx.play.episodes import schedule_of
 from fingers_mjx.play.log import WalkNoise, WalkRecorder
 from fingers_mjx.policy.source import load_bundle_setup

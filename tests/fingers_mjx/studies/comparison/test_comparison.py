@@ -143,6 +143,15 @@ def test_one_configuration_cannot_be_compared(tmp_path):
         compared(results(tmp_path, study({})), "base")
 
 
+def test_seeds_that_are_missing_for_one_reason_share_a_line(tmp_path):
+    states = {("lift", seed): ("waiting", "") for seed in (1, 3)}
+    states["lift", 4] = ("failed", "killed")
+    found = compared(results(tmp_path, study({"lift": 0.1}, 5), states), "base")
+    lines = [note for note in notes(found) if note.startswith("Missing: ")]
+    assert [line.partition(", wait")[0] for line in lines[:1]] == ["Missing: lift/1, 3"]
+    assert lines[1].startswith("Missing: lift/4, failed") and len(lines) == 2
+
+
 def test_seeds_that_were_trained_anew_are_named(tmp_path):
     """Negative control: what diverged of a member that is missing changes nothing."""
     path = write_sweep(tmp_path / "s", study({"lift": [0.1] * 5}), curves=False)
