@@ -38,7 +38,7 @@ import fingers_mjx
 from envs.actuator.catalogue import effect_kind
 from envs.hand.hand_file import Effect
 from envs.hand.quantity import Quantity
-from fingers_mjx.evaluation.source import nominal
+from fingers_mjx.evaluation.setups import nominal
 from fingers_mjx.play.player import Player
 from fingers_mjx.policy.source import load_bundle_setup
 from fingers_mjx.reports.diagnosis import diagnosis_figures
@@ -64,7 +64,7 @@ FAST = bool(os.environ.get("NOTEBOOK_FAST"))
 # %%
 KP, KD, MASS_KG, ARM_M, ROTOR = 24.0, 0.7, 0.5, 0.15, 0.002
 FILTER_HZ = 3.0
-RATE_HZ, ROUND_S, ROUNDS = 200, 10.0, 2
+RATE_HZ, ROUND_S, ROUNDS = (100, 3.0, 2) if FAST else (200, 10.0, 2)
 HIDDEN_RAD = 0.02
 
 
