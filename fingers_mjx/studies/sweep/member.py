@@ -8,6 +8,7 @@ from pathlib import Path
 from envs.errors import InputError
 from fingers_mjx.evaluation import source as evaluating
 from fingers_mjx.evaluation.evaluate import EpisodeTable
+from fingers_mjx.evaluation.setups import as_deployed
 from fingers_mjx.evaluation.together import evaluate_together
 from fingers_mjx.policy.interface import identity
 from fingers_mjx.policy.source import PolicySource, load_source
@@ -177,7 +178,7 @@ def _as_evaluated(one: Training, settings: Sequence[str]) -> PolicySource:
     room = {name: getattr(env, name) for name in free_fields(env)}
     trained = dataclasses.replace(loaded.setup.env, **room)
     setup = dataclasses.replace(loaded.setup, env=trained)
-    setup = overridden(evaluating.as_deployed(setup), settings)
+    setup = overridden(as_deployed(setup), settings)
     return dataclasses.replace(loaded, setup=setup)
 
 
