@@ -15,7 +15,7 @@ LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged
 OLDEST_PYTHON := 3.11
 NEWEST_PYTHON := 3.12
 VERSIONS := tests/envs tests/rewards tests/fingers_mjx/ppo tests/fingers_mjx/training \
-	tests/fingers_mjx/runs tests/fingers_mjx/export
+	tests/fingers_mjx/runs tests/fingers_mjx/export tests/fingers_mjx/studies
 
 help: ## List the targets
 	@grep -E '^[a-z0-9-]+:.*## ' $(MAKEFILE_LIST) | awk -F ':.*## ' '{printf "%-13s %s\n", $$1, $$2}'
