@@ -24,7 +24,7 @@ os.environ.setdefault("XLA_PYTHON_CLIENT_PREALLOCATE", "false")
 import jax
 
 from benchmarks.speed.layers import call_by_substep
-from benchmarks.speed.throughput import machine, versions
+from benchmarks.speed.throughput import provenance
 from envs.physics.backends import BACKENDS, default_backend
 from fingers_mjx.ppo.config import PRESETS, preset
 from fingers_mjx.runs.setup import Setup, make_env, new_setup, with_seed
@@ -99,7 +99,7 @@ def main() -> None:
         more = f", {gain:.2f} times one after the other" if gain else ""
         print(f"{members:3} x {worlds:6}: {rate:12,.0f} steps/s{more}", flush=True)
     if args.json:
-        record = {"machine": machine(), **versions(), "sizes": rows}
+        record = {**provenance(), "sizes": rows}
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 

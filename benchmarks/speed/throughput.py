@@ -65,8 +65,8 @@ def main() -> None:
             {"backend": k[0], "layer": k[1], "steps_per_s": rate, "note": notes[k]}
             for k, rate in rates.items()
         ]
-        record = {"task": args.task, "num_envs": worlds, "machine": machine()}
-        record |= versions() | {"layers": rows, "ratios": ratios}
+        record = {"task": args.task, "num_envs": worlds, **provenance()}
+        record |= {"layers": rows, "ratios": ratios}
         args.json.write_text(json.dumps(record, indent=1) + "\n", encoding="utf-8")
 
 
@@ -172,10 +172,10 @@ def machine() -> str:
     return f"{os.cpu_count()} cores ({platform.machine()}), JAX on {device}"
 
 
-def versions() -> dict[str, object]:
-    """Returns the commit, and the versions that the speed depends on most."""
-    found = {"jax": jax.__version__, "mujoco": mujoco.__version__}
-    return {"commit": commit_here(), "versions": found}
+def provenance() -> dict[str, object]:
+    """Returns machine and commit, and the versions that the speed depends on most."""
+    versions = {"jax": jax.__version__, "mujoco": mujoco.__version__}
+    return {"machine": machine(), "commit": commit_here(), "versions": versions}
 
 
 if __name__ == "__main__":

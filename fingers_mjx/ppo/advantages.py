@@ -39,13 +39,15 @@ def generalized_advantages(
         excess = delta + carries * excess
         return excess, excess
 
+    def error(following: Array) -> Array:
+        return (rewards + discount * goes_on * following - now) * valid
+
     now, last = values[:-1], values[-1:]
-    delta = (rewards + discount * goes_on * values[1:] - now) * valid
+    delta = error(values[1:])
     carries = discount * goes_on * valid * decay
     start = jnp.zeros_like(values[-1])
     unroll = min(STEPS_OF_A_TURN, len(delta))
     _, excess = jax.lax.scan(back, start, (delta, carries), reverse=True, unroll=unroll)
     targets = excess + now
-    following = jnp.concatenate([targets[1:], last])
-    advantages = (rewards + discount * goes_on * following - now) * valid
+    advantages = error(jnp.concatenate([targets[1:], last]))
     return jax.lax.stop_gradient(targets), jax.lax.stop_gradient(advantages)

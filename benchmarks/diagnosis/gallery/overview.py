@@ -93,13 +93,17 @@ def overview(records: Mapping[str, Record], rows: Sequence[dict]) -> str:
         records: by name.
         rows: what the diagnosis said, one of every record.
     """
-    found = {}
-    for half in ("first", "second"):
-        own = [(r, row) for row in rows if (r := records[row["record"]]).half == half]
-        found[half], found[f"{half}_table"] = _counts(own), _table(own)
-        if half == "second":
-            found["beside"] = _beside(own)
-    return TEXT.format(rows="benchmarks/results/gallery.jsonl", **found)
+    pairs = [(records[row["record"]], row) for row in rows]
+    first = [(record, row) for record, row in pairs if record.half == "first"]
+    second = [(record, row) for record, row in pairs if record.half == "second"]
+    return TEXT.format(
+        rows="benchmarks/results/gallery.jsonl",
+        first=_counts(first),
+        first_table=_table(first),
+        second=_counts(second),
+        second_table=_table(second),
+        beside=_beside(second),
+    )
 
 
 def rating(row: dict) -> str:
