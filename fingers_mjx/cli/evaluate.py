@@ -41,7 +41,8 @@ def add(commands) -> None:
     parser.add_argument(
         "--nominal", action="store_true", help="the nominal hand, without noise"
     )
-    options.settings(parser, "a setting of the task such as env.episode_s=10")
+    what = "a setting of the task such as env.episode_s=10"
+    options.settings(parser, f"{what}; --help after POLICY lists all, each a flag too")
     options.path(parser, "--json", help="summary to write")
     what = "summary, table and figures go here"
     options.path(parser, "--out", metavar="DIR", help=what)

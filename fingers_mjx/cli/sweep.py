@@ -43,7 +43,10 @@ def add(commands) -> None:
     )
     parser.set_defaults(settings=[], check=_check, needs_jax=False)
     options.offer_settings(parser, _offered, _preview)
-    what = "specification of the sweep; or the word status, and DIR after it"
+    what = (
+        "specification of the sweep, whose fields --help after it lists, each a flag "
+        "too; or the word status, and DIR after it"
+    )
     options.path(parser, "spec", metavar="SPEC.yaml", help=what)
     options.path(parser, "directory", metavar="DIR", nargs="?", help="with status only")
     options.path(parser, "-o", "--out", metavar="DIR", help="directory of the sweep")

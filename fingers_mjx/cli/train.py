@@ -43,7 +43,8 @@ def add(commands) -> None:
     )
     parser.set_defaults(check=check)
     options.offer_settings(parser, _offered, _preview)
-    parser.add_argument("task", metavar="TASK", nargs="?", help="such as crawl")
+    what = "such as crawl; --help after it lists all settings, each a flag too"
+    parser.add_argument("task", metavar="TASK", nargs="?", help=what)
     parser.add_argument(
         "--preset",
         metavar="NAME",

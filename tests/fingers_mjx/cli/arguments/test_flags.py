@@ -167,10 +167,13 @@ def test_a_policy_offers_the_settings_of_its_task(command, capsys):
     assert re.search(r"--env.episode-s FLOAT episode length .*? \[s\].*?20\.0", said)
 
 
-def test_help_of_a_command_without_its_argument_is_its_own(capsys):
+@pytest.mark.parametrize("command", ["train", "eval", "play", "sweep"])
+def test_help_without_the_argument_says_how_to_list_the_settings(command, capsys):
     with pytest.raises(SystemExit):
-        main(["eval", "--help"])
-    assert "--env." not in capsys.readouterr().out
+        main([command, "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "--env." not in said
+    assert re.search(r"--help after (it|POLICY) lists", said)
 
 
 @pytest.mark.parametrize(
