@@ -1,12 +1,15 @@
 """An installed package brings a task, a driver and a log reader by entry points."""
 
 import json
+import os
+import shutil
 import subprocess
 import sys
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.house import ROOT
 from support.installed import EXAMPLE, install, install_example
 
 from envs.config import plugins
@@ -124,16 +127,21 @@ def test_one_name_of_two_packages_names_both(example, monkeypatch, tmp_path):
 
 
 @pytest.mark.slow
-def test_the_example_installs(tmp_path):
-    site = tmp_path / "site"
-    how = ["--no-deps", "--quiet", "--target", str(site), str(EXAMPLE)]
-    subprocess.run(["uv", "pip", "install", *how], check=True)
-    program = "from envs.registry import get_task as g; print(g('crouch').summary)"
-    done = subprocess.run(
-        [sys.executable, "-c", program],
-        env={"PYTHONPATH": str(site)},
-        capture_output=True,
-        text=True,
-        check=True,
-    )
-    assert done.stdout.startswith("hold the palm low")
+def test_the_example_installs_and_every_command_knows_it(tmp_path):
+    site, run, bundle = (str(tmp_path / name) for name in ("site", "run", "bundle"))
+    uv = shutil.which("uv") or str(ROOT / ".uv/bin/uv")
+    how = ["--python", sys.executable, "--no-deps", "--quiet", "--target", site]
+    subprocess.run([uv, "pip", "install", *how, str(EXAMPLE)], check=True)
+    for words in (
+        ["train", "crouch", "--preset", "cpu", "--out", run, "--set", *FEW],
+        ["eval", run, "--episodes", "2", "--steps", "5"],
+        ["export", run, "--out", bundle],
+        ["play", bundle, "--seconds", "0.1"],
+    ):
+        subprocess.run(
+            [sys.executable, "-m", "fingers_mjx.cli.main", *words],
+            env=os.environ | {"PYTHONPATH": site},
+            cwd=tmp_path,
+            check=True,
+        )
+    assert load_bundle(bundle).manifest.task == "crouch"
