@@ -50,15 +50,17 @@ def _start(job: Job, place: Place) -> Found:
 
 
 def _report(job: Job, place: Place) -> Found:
-    """Figures that workers name themselves with their peers, until they say `done`."""
+    """Figures that workers name themselves, until they say `done`."""
     found: Found = []
     for worker in job.workers:
         print(f"{job.name}: {worker.peer}", flush=True)
         try:
             with speaking(worker, job, place) as speaker:
                 while not (said := speaker.hear()).get("done"):
-                    peer = dataclasses.replace(worker, peer=said["peer"])
-                    found.append((peer, _figure(said)))
+                    peer = said.get("peer", worker.peer)
+                    found.append(
+                        (dataclasses.replace(worker, peer=peer), _figure(said))
+                    )
         except (FailedError, CannotInstallError) as error:
             found.append((worker, none(job.quantity, "", str(error))))
     return found
@@ -85,4 +87,5 @@ _KINDS: dict[str, Callable[[Job, Place], Found]] = {
     "turns": _turns,
     "start": _start,
     "report": _report,
+    "learn": _report,
 }

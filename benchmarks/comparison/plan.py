@@ -13,6 +13,8 @@ FIRST_WORLDS = {"cpu": 64, "gpu": 2048}
 STAND_WORLDS = {"cpu": 64, "gpu": 4096}
 """Worlds of the training to a standing policy: those of our presets."""
 
+WALKING = "a training to walk, of eight minutes"
+
 
 @dataclass(frozen=True)
 class Worker:
@@ -38,8 +40,9 @@ class Job:
     Attributes:
         name: of its rows.
         kind: `turns` for rates by turns, `start` for seconds from the start of the
-            process to its message, `report` for figures that the workers name.
-        quantity: what the figures are; a worker of `report` names its own.
+            process to its message, `report` for figures that the workers name, `learn`
+            for those of a training from its start, with nothing compiled before.
+        quantity: what the figures are; workers of `report` and `learn` name their own.
         workers: the first is what the others are held against.
         worlds: stepped side by side.
         starts: of each worker, at most.
@@ -78,6 +81,7 @@ def jobs(device: str) -> tuple[Job, ...]:
     alone = SIZES[device] if device == "cpu" else ()
     fast += (mjlab,) if device == "gpu" else ()
     mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
+    mjlab_stand = (Worker(mjlab.peer, "mjlab", "mjlab_stand"),)
     resumed = (
         ours("ours_resume", backends[0]),
         playground("playground_resume", impls[0]),
@@ -95,8 +99,25 @@ def jobs(device: str) -> tuple[Job, ...]:
         *(Job(f"speed-{n}", "turns", speed, fast, n) for n in SIZES[device]),
         *(Job(f"mjlab-speed-{n}", "turns", speed, (fast[0], mjlab), n) for n in alone),
         Job("stand", "start", stands, stand, STAND_WORLDS[device], starts=1),
+        Job(
+            "mjlab-stand", "start", stands, mjlab_stand, STAND_WORLDS[device], starts=1
+        ),
+        *_walks(device, mjlab.peer),
         Job("resume", "report", "resumption and export", resumed, 64),
         Job("sysid", "report", "parameters of one joint", (fits,), 1),
         Job("unilab-first", "start", until, (unilab,), FIRST_WORLDS[device]),
         Job("mjlab-first", "start", until, (mjlab_first,), FIRST_WORLDS[device]),
     )
+
+
+def _walks(device: str, mjlab: str) -> tuple[Job, ...]:
+    """Returns the trainings to walk; a few cores of a CPU make no gait in the time."""
+    if device == "cpu":
+        return ()
+    named = {
+        "walk": ours("ours_walk", "warp"),
+        "playground-walk": playground("playground_walk", "warp"),
+        "mjlab-walk": Worker(mjlab, "mjlab", "mjlab_walk"),
+    }
+    worlds = STAND_WORLDS[device]
+    return tuple(Job(n, "learn", WALKING, (w,), worlds) for n, w in named.items())

@@ -124,7 +124,7 @@ def speaking(worker: Worker, job: Job, place: Place) -> Iterator[Speaker]:
         path.open("w+", encoding="utf-8", errors="replace") as log,
     ):
         given = place.environment(worker)
-        if job.kind == "start":
+        if job.kind in ("start", "learn"):
             given |= {name: str(Path(fresh, name)) for name in FRESH}
         speaker = Speaker(worker, job, place, log, given)
         try:

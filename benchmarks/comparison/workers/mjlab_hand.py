@@ -11,6 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 
 import mujoco
+import torch
 from mjlab.actuator.xml_actuator import XmlActuatorCfg
 from mjlab.entity import EntityArticulationInfoCfg, EntityCfg
 from mjlab.envs import ManagerBasedRlEnv, ManagerBasedRlEnvCfg, mdp
@@ -28,14 +29,18 @@ from mjlab.rl import (
 )
 from mjlab.scene import SceneCfg
 from mjlab.sim import MujocoCfg, SimulationCfg
+from mjlab.utils.lab_api.math import quat_apply, quat_apply_inverse
 from mjlab.utils.torch import configure_torch_backends
 
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
+from benchmarks.comparison.workers.walking import COMMAND_MPS, TRACKING, WIDTH_MPS
 
 ACTION_SCALE = 0.3
 
 
-def make_env(mjcf: Path, worlds: int, device: str, seed: int) -> RslRlVecEnvWrapper:
+def make_env(
+    mjcf: Path, worlds: int, device: str, seed: int, walks: bool = False
+) -> RslRlVecEnvWrapper:
     """Makes worlds of the hand, wrapped for its learner.
 
     Args:
@@ -43,6 +48,7 @@ def make_env(mjcf: Path, worlds: int, device: str, seed: int) -> RslRlVecEnvWrap
         worlds: stepped side by side.
         device: of Torch.
         seed: of the environment.
+        walks: whether the reward pays for walking straight forward too.
     """
     configure_torch_backends()
     terms = {
@@ -72,10 +78,7 @@ def make_env(mjcf: Path, worlds: int, device: str, seed: int) -> RslRlVecEnvWrap
                 },
             ),
         },
-        rewards={
-            "alive": RewardTermCfg(func=mdp.is_alive, weight=1.0),
-            "smooth": RewardTermCfg(func=mdp.action_rate_l2, weight=-0.01),
-        },
+        rewards=_rewards(walks),
         terminations={
             "time_out": TerminationTermCfg(func=mdp.time_out, time_out=True),
             "low": TerminationTermCfg(
@@ -92,6 +95,38 @@ def make_env(mjcf: Path, worlds: int, device: str, seed: int) -> RslRlVecEnvWrap
         seed=seed,
     )
     return RslRlVecEnvWrapper(ManagerBasedRlEnv(cfg=config, device=device))
+
+
+def velocity(env: ManagerBasedRlEnv) -> tuple[torch.Tensor, torch.Tensor]:
+    """Returns the palm's planar velocity along and across its heading [m/s].
+
+    Args:
+        env: whose worlds began with their heading along x of the world.
+    """
+    data = env.scene["robot"].data
+    start_w = data.default_root_state[:, 3:7]
+    forward_w = torch.zeros_like(data.root_link_lin_vel_w)
+    forward_w[:, 0] = 1.0
+    ahead = quat_apply(data.root_link_quat_w, quat_apply_inverse(start_w, forward_w))
+    ahead = torch.nn.functional.normalize(ahead[:, :2], dim=1)
+    vel_w = data.root_link_lin_vel_w[:, :2]
+    across = vel_w[:, 1] * ahead[:, 0] - vel_w[:, 0] * ahead[:, 1]
+    return (vel_w * ahead).sum(dim=1), across
+
+
+def _rewards(walks: bool) -> dict[str, RewardTermCfg]:
+    paid = {
+        "alive": RewardTermCfg(func=mdp.is_alive, weight=1.0),
+        "smooth": RewardTermCfg(func=mdp.action_rate_l2, weight=-0.01),
+    }
+    if walks:
+        paid["tracking"] = RewardTermCfg(func=_tracking, weight=TRACKING)
+    return paid
+
+
+def _tracking(env: ManagerBasedRlEnv) -> torch.Tensor:
+    along, across = velocity(env)
+    return torch.exp(-((along - COMMAND_MPS) ** 2 + across**2) / WIDTH_MPS**2)
 
 
 def make_runner(env: RslRlVecEnvWrapper, folder: Path, seed: int):

@@ -13,8 +13,11 @@ import jax.numpy as jnp
 import mujoco
 from ml_collections import config_dict
 from mujoco import mjx
+from mujoco.mjx._src.math import quat_inv, rotate
 from mujoco_playground import MjxEnv, State, step
 from mujoco_playground._src.mjx_env import make_data
+
+from benchmarks.comparison.workers.walking import COMMAND_MPS, TRACKING, WIDTH_MPS
 
 ACTION_SCALE = 0.3
 ROOM = {"naconmax": 48, "njmax": 128}
@@ -57,7 +60,8 @@ class HandStand(MjxEnv):
         data = mjx.forward(self._mjx_model, data)
         zero, last = jnp.zeros(()), jnp.zeros(self.action_size)
         obs = self._seen(data, last)
-        return State(data, obs, zero, zero, {"upright": zero}, {"last": last})
+        metrics = jax.tree.map(jnp.zeros_like, self._paid(data, zero)[1])
+        return State(data, obs, zero, zero, metrics, {"last": last})
 
     def step(self, state: State, action: jax.Array) -> State:
         """Moves the targets and does four physics steps."""
@@ -68,14 +72,19 @@ class HandStand(MjxEnv):
         upright = jnp.exp(-(height / 0.02) - turned / 0.02)
         fallen = (height > 0.06) | jnp.isnan(data.qpos).any()
         obs = self._seen(data, action)
+        reward, metrics = self._paid(data, upright)
         return state.replace(
             data=data,
             obs=obs,
-            reward=upright,
+            reward=reward,
             done=fallen.astype(jnp.float32),
-            metrics={"upright": upright},
+            metrics=metrics,
             info=state.info | {"last": action},
         )
+
+    def _paid(self, data, upright: jax.Array) -> tuple[jax.Array, dict]:
+        """Returns the reward, and what is logged of a step."""
+        return upright, {"upright": upright}
 
     def _seen(self, data, last: jax.Array) -> jax.Array:
         return jnp.concatenate([data.qpos[2:], data.qvel, last])
@@ -99,3 +108,18 @@ class HandStand(MjxEnv):
     def mjx_model(self) -> mjx.Model:
         """Model on the device."""
         return self._mjx_model
+
+
+class HandWalk(HandStand):
+    """A hand that shall walk straight forward; its heading is that of its palm."""
+
+    def _paid(self, data, upright: jax.Array) -> tuple[jax.Array, dict]:
+        forward_w = jnp.array([1.0, 0.0, 0.0])
+        ahead = rotate(rotate(forward_w, quat_inv(self._stance[3:7])), data.qpos[3:7])
+        ahead = ahead[:2] / jnp.maximum(jnp.linalg.norm(ahead[:2]), 1e-6)
+        along = data.qvel[:2] @ ahead
+        across = data.qvel[1] * ahead[0] - data.qvel[0] * ahead[1]
+        apart = (along - COMMAND_MPS) ** 2 + across**2
+        tracking = jnp.exp(-apart / WIDTH_MPS**2)
+        metrics = {"upright": upright, "speed_per_step": along}
+        return upright + TRACKING * tracking, metrics

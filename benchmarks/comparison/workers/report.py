@@ -36,6 +36,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--backend", default="", help="physics; empty for the default")
     parser.add_argument("--mjcf", type=Path, help="the standing hand")
     parser.add_argument("--out", type=Path, help="folder for what must be written")
+    parser.add_argument(
+        "--seconds", type=float, default=480.0, help="of a training of given length"
+    )
     return parser.parse_args()
 
 
