@@ -1,7 +1,8 @@
 """Stands, trains, evaluates, exports and films another hand: `walk.py HAND --out DIR`.
 
 Every step is a command of `fingers`, which is printed before it runs. A step whose
-result is there is not done again, and training goes on where it was stopped.
+result is there is not done again, and training goes on where it was stopped; what
+comes after a training that is done needs no GPU.
 """
 
 import argparse
@@ -56,12 +57,21 @@ def main(argv: list[str] | None = None) -> int:
         if result.exists():
             print(f"# {result} is there", flush=True)
             continue
-        print(f"$ fingers {shlex.join(arguments)}", flush=True)
-        if status := fingers(arguments):
-            return status
+        run = given.out / "run"
+        if arguments[0] != "train" or not _finished(run):
+            print(f"$ fingers {shlex.join(arguments)}", flush=True)
+            if status := fingers(arguments):
+                return status
         if arguments[0] == "train":
-            _draw(given.out / "run", result)
+            _draw(run, result)
     return 0
+
+
+def _finished(run: Path) -> bool:
+    """Whether nothing is left to train, so that no GPU is needed for the rest."""
+    metrics = run / "metrics.jsonl"
+    rows = read_metrics(metrics) if metrics.exists() else []
+    return bool(rows) and rows[-1]["iteration"] == rows[-1]["iterations"]
 
 
 def _draw(run: Path, picture: Path) -> None:

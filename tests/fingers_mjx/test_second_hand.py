@@ -119,6 +119,14 @@ def test_the_shim_does_what_training_does(bundle, run):
     assert wrong["observation"] > 1e-3 and wrong["target"] > 1e-6
 
 
+def test_the_leap_policy_is_the_one_that_was_measured():
+    bundle = load_bundle(EXAMPLE / "leap_policy")
+    shown = json.loads((EXAMPLE / "leap_eval.json").read_text("utf-8"))
+    steps = bundle.manifest.provenance.normalizer.steps
+    assert bundle.manifest.policy.action_size == 16
+    assert shown["steps_trained"] == steps and shown["episodes"] == 256
+
+
 def test_what_is_made_for_another_hand_refuses_it(bundle, hand, run, capsys):
     with pytest.raises(BundleError, match="12 joints"):
         load_bundle(run, vendor_hand().joint_names)
@@ -148,3 +156,6 @@ def test_the_script_does_all_of_it(folder):
         name for name in (*made, "walk.webp") if not (out / name).stat().st_size
     ] == []
     assert walk.main(argv) == 0  # all is there
+    (out / "curve.png").unlink()
+    argv += ["--set", "backend=none"]  # refused, if anything were trained
+    assert walk.main(argv) == 0 and (out / "curve.png").exists()
