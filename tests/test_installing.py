@@ -9,6 +9,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from fingers_mjx.cli.main import make_parser
 
@@ -59,6 +60,20 @@ def test_extras_and_groups_exist(path):
 @pytest.mark.parametrize("path", TEXTS, ids=name)
 def test_nothing_is_installed_from_where_it_is_not(path):
     assert UNPUBLISHED.search(path.read_text("utf-8")) is None
+
+
+def test_hooks_run_what_make_format_runs_and_need_no_uv():
+    text = (ROOT / ".pre-commit-config.yaml").read_text("utf-8")
+    hooks = [hook for repo in yaml.safe_load(text)["repos"] for hook in repo["hooks"]]
+    made = re.search(
+        r"^format: .*\n((?:\t.*\n)+)", (ROOT / "Makefile").read_text(), re.M
+    )
+    assert made
+    wanted = [
+        line.strip().removeprefix("$(RUN) ").removesuffix(" .")
+        for line in made[1].splitlines()
+    ]
+    assert [hook["entry"] for hook in hooks] == [f".venv/bin/{x}" for x in wanted]
 
 
 @pytest.mark.parametrize(
