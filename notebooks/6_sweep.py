@@ -186,7 +186,7 @@ figure
 
 # %%
 TREE = Path(fingers_mjx.__file__).parent.parent
-ABLATION = TREE / "benchmarks/results/ablation"  # in a clone, not in a wheel
+ABLATION = TREE / "benchmarks/results/ablation_third"  # in a clone, not in a wheel
 MEASURES = ("task_speed_mps", "five_finger_participation")
 figure = None
 if ABLATION.exists():

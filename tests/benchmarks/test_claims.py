@@ -1,10 +1,12 @@
 """The sweeps that test the paper's claims can begin, and differ in rewards alone."""
 
+import json
 import re
 from pathlib import Path
 
 import pytest
 
+from benchmarks.claims.claims import WALKS_MPS
 from envs.config.typed import load_yaml
 from envs.hand.hand_file import hand_yaml, load_hand_file
 from fingers_mjx.cli.main import make_parser
@@ -45,15 +47,30 @@ def test_the_sweeps_can_begin(tmp_path, name):
 
 
 def test_the_fourth_budget_differs_in_what_it_names():
-    spec, before = swept("budget_fourth"), swept("ablation")
-    assert dict(spec.set) == dict(before.set)
-    assert spec.evaluate == before.evaluate
+    spec, after = swept("budget_fourth"), swept("ablation")
+    chosen = {"num_envs": after.set["num_envs"]}
+    assert dict(spec.set) | chosen == dict(after.set)
+    assert int(after.set["num_envs"]) == 2 * int(spec.set["num_envs"])
+    assert spec.evaluate == after.evaluate
     assert spec.configurations == {
-        "more_worlds": {"num_envs": 2 * int(before.set["num_envs"])},
+        "more_worlds": chosen,
         "less_noise": {"ppo.entropy_cost": 0.001},
     }
     assert spec.seeds == swept("budget").seeds
-    assert min(spec.seeds) >= before.seeds
+    assert min(spec.seeds) >= after.seeds
+
+
+def test_the_fourth_budget_was_chosen_by_its_rule():
+    results = CLAIMS.parent / "results/budget_fourth"
+    speeds = {
+        file.stem: measures["task_speed_mps"]["mean"]
+        for file in sorted(results.glob("*-*.json"))
+        for measures in [json.loads(file.read_text("utf-8"))["measures"]]
+    }
+    assert speeds.keys() >= {f"more_worlds-{seed}" for seed in range(100, 106)}
+    walks = {name for name, speed in speeds.items() if speed >= WALKS_MPS}
+    assert sum(name.startswith("more_worlds") for name in walks) >= 5
+    assert sum(name.startswith("less_noise") for name in speeds.keys() - walks) >= 1
 
 
 def test_only_the_hand_differs():
