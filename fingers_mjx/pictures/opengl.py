@@ -7,6 +7,7 @@ the curve from light to colour are those of `fingers_mjx.pictures.shade`.
 import copy
 import importlib
 import os
+import warnings
 from typing import Any
 
 import mujoco
@@ -59,10 +60,7 @@ class OpenGlRenderer:
         screen.offwidth, screen.offheight = self._fine
         self._model.vis.quality.offsamples = 0
         self._model.vis.map.shadowclip = SHADOW_M / self._model.stat.extent
-        self._context = _context(self._fine)
-        self._context.make_current()
-        scale = mujoco.mjtFontScale.mjFONTSCALE_100
-        self._drawing = mujoco.MjrContext(self._model, scale)
+        self._context, self._drawing = _contexts(self._fine, self._model)
         buffer = mujoco.mjtFramebuffer.mjFB_OFFSCREEN
         mujoco.mjr_setBuffer(buffer, self._drawing)
         self._scene = mujoco.MjvScene(self._model, maxgeom=self._model.ngeom + 10)
@@ -182,8 +180,10 @@ def renderer_name() -> str:
     return bytes(gl.glGetString(gl.GL_RENDERER) or b"").decode(errors="replace")
 
 
-def _context(size: tuple[int, int]) -> Any:
-    """Makes an OpenGL context on the first platform that has one.
+def _contexts(size: tuple[int, int], model: mujoco.MjModel) -> tuple[Any, Any]:
+    """Makes OpenGL's and MuJoCo's context on the first platform where both can be made.
+
+    One that has no display may give a context in which nothing can be drawn.
 
     Raises:
         InputError: none has.
@@ -193,9 +193,19 @@ def _context(size: tuple[int, int]) -> Any:
     for name in names:
         # Missing libraries and displays are reported in as many ways as there are.
         try:
-            os.environ["PYOPENGL_PLATFORM"] = name if name != "glfw" else ""
-            return importlib.import_module(f"mujoco.{name}").GLContext(*size)
+            return _contexts_of(name, size, model)
         except Exception:
             continue
     found = f"no OpenGL ({', '.join(names)})"
     raise InputError("--renderer", "mujoco", found, "raycast, or one with OpenGL")
+
+
+def _contexts_of(
+    name: str, size: tuple[int, int], model: mujoco.MjModel
+) -> tuple[Any, Any]:
+    """The same on one platform; raises whatever that says."""
+    os.environ["PYOPENGL_PLATFORM"] = name if name != "glfw" else ""
+    with warnings.catch_warnings(action="ignore"):  # of glfw, about each call
+        context = importlib.import_module(f"mujoco.{name}").GLContext(*size)
+    context.make_current()
+    return context, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)

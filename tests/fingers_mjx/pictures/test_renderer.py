@@ -1,5 +1,9 @@
 """One picture from two renderers."""
 
+import os
+import sys
+import types
+
 import mujoco
 import numpy as np
 import pytest
@@ -10,7 +14,7 @@ from envs.hand.model import build_model
 from envs.hand.stance import stance_of
 from fingers_mjx.pictures import renderer as module
 from fingers_mjx.pictures.camera import Camera
-from fingers_mjx.pictures.opengl import OpenGlRenderer
+from fingers_mjx.pictures.opengl import PLATFORMS, OpenGlRenderer
 from fingers_mjx.pictures.raycast import render
 from fingers_mjx.pictures.renderer import renderer
 from fingers_mjx.pictures.shade import Look
@@ -62,6 +66,28 @@ def test_a_hand_that_has_moved_is_another_picture(scene, opengl):
     cast = render(model, data, Camera(), SIZE)
     share, _ = difference(cast, opengl.draw(moved, Camera()))
     assert share > 0.05
+
+
+def test_a_context_in_which_nothing_can_be_drawn_is_no_opengl(scene, monkeypatch):
+    """GLFW without a display gives one; drawing in it ends in a FatalError."""
+
+    class Empty:
+        def __init__(self, *_):
+            tried.append(os.environ["PYOPENGL_PLATFORM"])
+
+        def make_current(self):
+            pass
+
+    tried: list[str] = []
+    for name in PLATFORMS:
+        made = types.SimpleNamespace(GLContext=Empty)
+        monkeypatch.setitem(sys.modules, f"mujoco.{name}", made)
+    monkeypatch.delenv("MUJOCO_GL", raising=False)
+    monkeypatch.setenv("PYOPENGL_PLATFORM", "")
+    with pytest.raises(InputError, match=r"--renderer.*no OpenGL"):
+        OpenGlRenderer(scene[0], SIZE, Look())
+    assert tried == ["egl", "osmesa", ""]
+    assert module.drawn_by() == "ray casting on the CPU"
 
 
 def test_without_opengl_rays_are_cast(scene, monkeypatch):
