@@ -20,13 +20,8 @@ from jaxtyping import Bool, Float, Int
 
 from envs.actuator.effects.mount_tilt import tilted
 from envs.batch import BatchEnv
-from sysid.least_squares import (
-    Fit,
-    Task,
-    fit_all,
-    gauss_newton,
-    standard_errors,
-)
+from sysid.least_squares import Fit, Task, fit_all, standard_errors
+from sysid.least_squares.newton import gauss_newton
 from sysid.logs.log import MeasuredLog
 from sysid.result import Diagnosis
 from sysid.walking.hypotheses import Hypothesis, axes, candidate, hypotheses

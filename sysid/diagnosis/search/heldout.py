@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float
 
 from sysid.diagnosis.search.problem import Problem
 from sysid.least_squares import Fit, Task
+from sysid.least_squares.newton import bounded_step, normal_equations, solved
 
 STEPS = 4
 """Largest number of steps without a fold."""
@@ -52,25 +53,21 @@ class _Part:
         What belongs to a record and not to the mechanism stays.
         """
         fit, task, k = self.fit, self.task, self.fit.free
-        every = np.ones(len(self.kept), bool)
-        own = self._step(theta, residual, self.kept)
-        own = own - self._step(fit.theta, fit.residual, every)
+        hessian, slope = self._quadratic(theta, residual, self.kept)
+        common = self._quadratic(fit.theta, fit.residual, np.ones(len(self.kept), bool))
+        rest = solved(*common, ~np.isin(k, fit.bounded))
+        bounds = ((end - theta)[k] for end in (task.low, task.high))
         moved = theta.copy()
-        moved[k] = np.clip(theta[k] - own, task.low[k], task.high[k])
+        moved[k] += bounded_step(hessian, slope + hessian @ rest, *bounds)
+        moved[k] = np.clip(moved[k], task.low[k], task.high[k])
         moved[self.local] = fit.theta[self.local]
         return moved
 
-    def _step(self, theta: np.ndarray, residual: np.ndarray, kept: np.ndarray):
-        k = self.fit.free
-        j, r = self.fit.jacobian[kept], residual[kept]
-        weight = 1.0 / self.task.deviation[k] ** 2
-        slope = j.T @ r + weight * (theta - self.task.center)[k]
-        hessian = j.T @ j + np.diag(weight)
-        try:
-            return np.linalg.solve(hessian, slope)
-        except np.linalg.LinAlgError:
-            # A free coordinate that these folds do not show stays where it is.
-            return np.linalg.lstsq(hessian, slope)[0]
+    def _quadratic(self, theta: np.ndarray, residual: np.ndarray, kept: np.ndarray):
+        """Returns curvature and slope of the cost of the samples kept."""
+        k, task = self.fit.free, self.task
+        slopes, away = self.fit.jacobian[kept], (theta - task.center)[k]
+        return normal_equations(slopes, residual[kept], away, task.deviation[k])
 
 
 def held_out(

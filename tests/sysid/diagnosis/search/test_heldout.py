@@ -92,3 +92,28 @@ def test_a_free_coordinate_that_no_other_fold_shows_stays():
     (fit,) = fit_all(far, [free], rounds=10)
     (held,) = held_out(problem, [free], [fit])
     assert held.theta[1] == pytest.approx([3.0, fit.theta[1]], abs=1e-3)
+
+
+def test_what_meets_a_bound_takes_its_partner_along():
+    """Two coordinates that compensate each other, one of which is at its bound."""
+    rng = np.random.default_rng(5)
+    folds = np.arange(60) % 3
+    shown = np.stack([np.ones(60), 1.0 + 0.01 * rng.normal(size=60)], 1)
+
+    def sum_of_both(thetas):
+        both = np.asarray(thetas) - np.array([3.0, -1.0])
+        return 200.0 * both @ shown.T + rng_noise
+
+    rng_noise = rng.normal(size=60)
+    problem = SimpleNamespace(
+        folds=lambda: folds,
+        fold=folds,
+        residual=sum_of_both,
+        space=SimpleNamespace(local=lambda: []),
+    )
+    for high in (2.0, 2.9):  # met by the common optimum, and by folds alone
+        task = replace(TASK, low=np.full(2, -9.0), high=np.array([high, 9.0]))
+        (fit,) = fit_all(sum_of_both, [task], rounds=20)
+        (held,) = held_out(problem, [task], [fit])
+        inside = float(fit.residual @ fit.residual)
+        assert held.error < 1.5 * inside

@@ -19,6 +19,8 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.stats import t as student
 
+from sysid.least_squares.newton import bounded_step, damped, normal_equations
+
 Residual = Callable[[Float[np.ndarray, "c n"]], Float[np.ndarray, "c r"]]
 """Coordinates of candidates -> their weighted residuals."""
 
@@ -85,6 +87,9 @@ class Fit:
 STEP = 1e-2
 """Step of the differences, in units of the coordinate or of its prior deviation."""
 
+LONGEST = 2.0
+"""Longest step of a coordinate [1]."""
+
 _TRIED = (0.03, 30.0)
 """Dampings that are tried, as multiples of the last one that helped."""
 
@@ -110,12 +115,13 @@ def fit_all(
 
     Source:
         D. W. Marquardt, "An Algorithm for Least-Squares Estimation of Nonlinear
-        Parameters", Journal of SIAM 11(2), 1963; two dampings a round are ours.
+        Parameters", Journal of SIAM 11(2), 1963; two dampings a round are ours; bounds:
+        `bounded_step`.
     """
     shared = shared or {}
     states = [_State(task) for task in tasks]
     for state, r in zip(
-        states, residual(np.stack([t.start for t in tasks])), strict=True
+        states, residual(np.stack([s.theta for s in states])), strict=True
     ):
         state.enter(r)
     for _ in range(rounds):
@@ -127,32 +133,6 @@ def fit_all(
     _derive(residual, best, {})
     _derive(residual, [s for s in states if s not in best], shared)
     return [state.result() for state in states]
-
-
-def gauss_newton(
-    jacobian: Float[np.ndarray, "r k"],
-    residual: Float[np.ndarray, " r"],
-    away: Float[np.ndarray, " k"],
-    deviation: Float[np.ndarray, " k"],
-    damping: float = 0.0,
-) -> Float[np.ndarray, " k"]:
-    """Δθ = −(H + λ diag H)⁻¹ (Jᵀr + Σ⁻¹(θ − θ⁰)) with H = JᵀJ + Σ⁻¹.
-
-    Args:
-        jacobian: J, of the weighted residual by the coordinates [1].
-        residual: r, weighted: in units of its standard deviation [1].
-        away: θ − θ⁰ [1].
-        deviation: of the prior, positive; Σ = diag σ² [1].
-        damping: λ ≥ 0 of Levenberg and Marquardt; 0 for the step of Gauss and Newton.
-
-    Source:
-        D. W. Marquardt, "An Algorithm for Least-Squares Estimation of Nonlinear
-        Parameters", Journal of SIAM 11(2), 1963.
-    """
-    weight = 1.0 / deviation**2
-    h = jacobian.T @ jacobian + np.diag(weight)
-    g = jacobian.T @ residual + weight * away
-    return -np.linalg.solve(h + damping * np.diag(np.diag(h) + 1e-9), g)
 
 
 def block_sandwich(
@@ -236,10 +216,12 @@ class _State:
         j = np.stack([self.columns[i] for i in k], 1)
         away, deviation = (self.theta - task.center)[k], task.deviation[k]
         result = []
+        hessian, slope = normal_equations(j, self.r, away, deviation)
+        low, high = (task.low - self.theta)[k], (task.high - self.theta)[k]
         for damping in (self.damping * x for x in _TRIED):
-            d = np.clip(gauss_newton(j, self.r, away, deviation, damping), -2.0, 2.0)
-            theta = self.theta.copy()
-            theta[k] = np.clip(theta[k] + d, task.low[k], task.high[k])
+            theta, h = self.theta.copy(), damped(hessian, damping)
+            step = np.clip(bounded_step(h, slope, low, high), -LONGEST, LONGEST)
+            theta[k] = np.clip(theta[k] + step, task.low[k], task.high[k])
             result.append(theta)
         return result
 
