@@ -49,7 +49,7 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
         chance = gain - gap < THRESHOLD and not _confusable(effect, cause)
         if np.isfinite(gap) and gap < 0.9 * gain:
             shown, apart = round(gap, 3), bool(distinct or chance)
-            apart = apart or not found.judge.confirms(without, model)
+            apart = apart or not found.judge.prefers(without, model)
             result.append(Alternative(effect, shown, apart, cause))
     return sorted(result, key=lambda a: a.score_gap)[:8]
 

@@ -30,9 +30,7 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
     angle = isinstance(found.problem, OutputProblem)
     gains = {} if angle else _equation_gains(found, units, seed)
     if judge.sees:
-        same = judge.serving(found.best)
-        pair = (same.nominal(found.base), same.moved(found.best))
-        before, after = (same.error(m) for m in pair)
+        before, after = (judge.error(m) for m in judge.pair(found.base, found.best))
         gains["position"] = _gain(
             found.problem, before, after, judge.valid, units["position"], seed
         )

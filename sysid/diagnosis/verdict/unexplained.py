@@ -100,8 +100,7 @@ def _no_nearer(found: Search) -> list[str]:
     causes = found.best.effects
     if not causes or not found.judge.sees:
         return []
-    judge = found.judge.serving(found.best)
-    if judge.t_value(judge.nominal(found.base), judge.moved(found.best)) > 0.0:
+    if found.judge.t_value(*found.judge.pair(found.base, found.best)) > 0.0:
         return []
     return [f"with {' and '.join(causes)} the simulated motion comes no nearer"]
 

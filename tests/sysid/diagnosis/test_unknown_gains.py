@@ -4,6 +4,8 @@ In the simulation of the angle alone a servo's free damping does what friction d
 records are integrated here, by none of the project's simulators.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,6 +13,7 @@ from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.candidate import fit_models
+from sysid.diagnosis.search.intervals import standard_errors
 from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
 from sysid.diagnosis.search.search import settled
 from sysid.diagnosis.search.space import SIGMA
@@ -88,5 +91,35 @@ def test_the_judge_takes_free_gains_from_the_effort(free):
         if free:
             assert np.exp(slot.nominal) == pytest.approx(ratio, rel=0.1)
             assert slot.prior_sd == pytest.approx(SIGMA * GAIN_TOLERANCE)
+            unsure = standard_errors(problem, model, problem.samples)[index]
+            assert unsure < slot.prior_sd
         else:
             assert slot == problem.space.slots[index]
+
+
+def test_each_model_has_the_gains_that_the_effort_shows_to_it():
+    """Those of a wrong cause would make the simulation without it wrong."""
+    logs, mechanism = recorded(0.0)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    (model,) = fit_models(problem, [("viscous_friction",)], [base.fit.theta], rounds=20)
+    (index,) = problem.space.of("damping")
+    wrong = np.array(model.fit.theta)
+    wrong[index] += 0.5
+    other = replace(model, fit=replace(model.fit, theta=wrong))
+    judge = Judge(problem, base)
+    alone, beside = judge.pair(base, model)[0], judge.pair(base, other)[0]
+    assert beside is alone
+    served = judge.serving(other).nominal(base)  # as it was once
+    assert served.fit.cost > 2.0 * alone.fit.cost
+
+
+def test_gains_are_no_surer_than_the_effort_shows_them():
+    logs, mechanism = recorded(0.1)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    (index,) = problem.space.of("damping")
+    fit = base.fit
+    noisy = replace(base, fit=replace(fit, jacobian=1e-3 * fit.jacobian))
+    slot = Judge(problem, base).serving(noisy).output.space.slots[index]
+    assert slot.prior_sd > 2.0 * SIGMA * GAIN_TOLERANCE

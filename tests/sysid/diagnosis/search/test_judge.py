@@ -6,21 +6,21 @@ import numpy as np
 import pytest
 
 from sysid.diagnosis.search import judge as module
-from sysid.diagnosis.search.judge import LEVEL, Judge
+from sysid.diagnosis.search.judge import LEAST_FALL, LEVEL, Judge
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 
 ENOUGH = 2.0 * NOMINAL_THRESHOLD
 
 
 class Said(Judge):
-    """A judge whose simulations gain so much, and differ so clearly."""
+    """A judge whose simulations gain so much, differ so clearly, and fall so far."""
 
-    def __init__(self, gain, t, repeat=True, effort=True):
+    def __init__(self, gain, t, repeat=True, effort=True, fall=2.0 * LEAST_FALL):
         data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
         space = SimpleNamespace(of=lambda effect: [])
         problem = SimpleNamespace(data=data, known="both", repeat=repeat, space=space)
         super().__init__(problem, None)
-        self.gain, self.t = gain, t
+        self.gain, self.t, self.share = gain, t, fall
         self.output = SimpleNamespace(samples=4)
 
     def moved(self, model):
@@ -30,6 +30,9 @@ class Said(Judge):
 
     def t_value(self, worse, better):
         return self.t
+
+    def fall(self, worse, better):
+        return self.share
 
 
 @pytest.fixture(autouse=True)
@@ -52,6 +55,15 @@ def test_what_the_angle_does_not_need_is_no_cause():
     assert not says(Said(0.0, 2.0 * LEVEL))
 
 
+def test_a_difference_that_is_sure_but_small_is_no_cause():
+    """A servo's cycle on a quiet encoder: 0.102 mrad become 0.101 by 12 nat."""
+    assert says(Said(ENOUGH, 9.0, fall=1.1 * LEAST_FALL))
+    small = Said(ENOUGH, 9.0, fall=0.9 * LEAST_FALL)
+    assert not says(small)
+    nothing, cause = SimpleNamespace(), SimpleNamespace(gain=ENOUGH)
+    assert small.prefers(nothing, cause)  # beside a cause that counts
+
+
 def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
     """Friction that a servo's damping hides: 381 times the noise becomes none."""
     assert says(Said(1.4, 7.4), before=381.0, after=0.5)
@@ -71,10 +83,11 @@ def test_without_repeats_next_to_nothing_must_remain():
         {"effort": False},
         {"after": 100.0},
         {"before": 1.8},
+        {"fall": 0.9 * LEAST_FALL},
     ],
 )
 def test_it_does_not_count_otherwise(changed):
-    """The angle comes no nearer, the noise is not known, or much remains."""
+    """The angle comes (next to) no nearer, noise is not known, or much remains."""
     left = {"before": 381.0, "after": 0.5, **changed}
     sizes = {k: left.pop(k) for k in ("before", "after")}
     assert not says(Said(**{"gain": 1.4, "t": 7.4, **left}), **sizes)

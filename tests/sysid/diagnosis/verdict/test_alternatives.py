@@ -37,7 +37,7 @@ def model(effect, behind, moved=0.0):
 def test_what_predicts_the_same_is_set_apart_by_priors_alone(behind, moved, apart):
     best, base = model("damping", 0.0), model("", 200.0, moved=50.0)
     other = model("viscous_friction", behind, moved)
-    judge = SimpleNamespace(confirms=lambda smaller, larger: True)
+    judge = SimpleNamespace(prefers=lambda smaller, larger: True)
     others = ({"damping": [other]}, {"damping": base}, [])
     found = Search(None, base, best, *others, SAMPLES, judge)
     (alternative,) = alternatives_of(found)
