@@ -178,11 +178,11 @@ figure
 # %% [markdown]
 # ## A sweep that was trained
 #
-# `benchmarks/claims/ablation.yaml` takes terms out of the reward of crawling. Each dot
-# is one training of 147 M control steps, evaluated in 256 randomized episodes. A rule
-# was written down before: if fewer than ten of the twelve of `ours` reach 0.05 m/s,
-# nothing is concluded. So short a training would show who finds a gait early rather
-# than whose gait is better.
+# `benchmarks/results/ablation_third` has trainings with terms taken out of the reward
+# of crawling. Each dot is one of 147 M control steps, evaluated in 256 randomized
+# episodes. A rule was written down before: if fewer than ten of the twelve of `ours`
+# reach 0.05 m/s, nothing is concluded. So short a training would show who finds a gait
+# early rather than whose gait is better.
 
 # %%
 TREE = Path(fingers_mjx.__file__).parent.parent
