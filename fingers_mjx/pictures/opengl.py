@@ -29,6 +29,8 @@ from fingers_mjx.pictures.shade import (
 
 PLATFORMS = ("egl", "osmesa", "glfw")
 """What makes a context, in the order in which it is tried; see `MUJOCO_GL`."""
+PLATFORM = "PYOPENGL_PLATFORM"
+"""Variable by which PyOpenGL knows which of them."""
 SOFTWARE = ("llvmpipe", "softpipe", "swrast", "swiftshader")
 """Renderers on the CPU, which are not faster than ray casting."""
 FINER = 2
@@ -186,17 +188,21 @@ def _contexts(size: tuple[int, int], model: mujoco.MjModel) -> tuple[Any, Any]:
     One that has no display may give a context in which nothing can be drawn.
 
     Raises:
-        InputError: none has.
+        InputError: none has; with what the first says.
     """
-    asked = os.environ.get("MUJOCO_GL", "")
-    names = (asked,) if asked in PLATFORMS else PLATFORMS
+    asked, was = os.environ.get("MUJOCO_GL", ""), os.environ.get(PLATFORM)
+    names, said = (asked,) if asked in PLATFORMS else PLATFORMS, []
     for name in names:
         # Missing libraries and displays are reported in as many ways as there are.
         try:
             return _contexts_of(name, size, model)
-        except Exception:
-            continue
-    found = f"no OpenGL ({', '.join(names)})"
+        except Exception as error:
+            said.append(f"{name}: {error}")
+    if was is None:
+        os.environ.pop(PLATFORM, None)
+    else:
+        os.environ[PLATFORM] = was
+    found = f"no OpenGL ({said[0]})"
     raise InputError("--renderer", "mujoco", found, "raycast, or one with OpenGL")
 
 
@@ -204,8 +210,13 @@ def _contexts_of(
     name: str, size: tuple[int, int], model: mujoco.MjModel
 ) -> tuple[Any, Any]:
     """The same on one platform; raises whatever that says."""
-    os.environ["PYOPENGL_PLATFORM"] = name if name != "glfw" else ""
+    os.environ[PLATFORM] = name if name != "glfw" else ""
     with warnings.catch_warnings(action="ignore"):  # of glfw, about each call
         context = importlib.import_module(f"mujoco.{name}").GLContext(*size)
-    context.make_current()
-    return context, mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
+        context.make_current()
+        try:
+            scale = mujoco.mjtFontScale.mjFONTSCALE_100
+            return context, mujoco.MjrContext(model, scale)
+        except Exception:
+            context.free()
+            raise

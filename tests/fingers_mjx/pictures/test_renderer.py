@@ -78,15 +78,20 @@ def test_a_context_in_which_nothing_can_be_drawn_is_no_opengl(scene, monkeypatch
         def make_current(self):
             pass
 
+        def free(self):
+            freed.append(self)
+
     tried: list[str] = []
+    freed: list[Empty] = []
     for name in PLATFORMS:
         made = types.SimpleNamespace(GLContext=Empty)
         monkeypatch.setitem(sys.modules, f"mujoco.{name}", made)
     monkeypatch.delenv("MUJOCO_GL", raising=False)
-    monkeypatch.setenv("PYOPENGL_PLATFORM", "")
-    with pytest.raises(InputError, match=r"--renderer.*no OpenGL"):
+    monkeypatch.setenv("PYOPENGL_PLATFORM", "before")
+    with pytest.raises(InputError, match=r"--renderer.*no OpenGL \(egl: "):
         OpenGlRenderer(scene[0], SIZE, Look())
-    assert tried == ["egl", "osmesa", ""]
+    assert tried == ["egl", "osmesa", ""] and len(freed) == 3
+    assert os.environ["PYOPENGL_PLATFORM"] == "before"
     assert module.drawn_by() == "ray casting on the CPU"
 
 
