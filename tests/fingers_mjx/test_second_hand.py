@@ -3,6 +3,7 @@
 import dataclasses
 import importlib.util
 import json
+import re
 from pathlib import Path
 
 import jax
@@ -119,12 +120,25 @@ def test_the_shim_does_what_training_does(bundle, run):
     assert wrong["observation"] > 1e-3 and wrong["target"] > 1e-6
 
 
-def test_the_leap_policy_is_the_one_that_was_measured():
+LEAP = {
+    "training": ("task_speed_mps", "path_speed_mps", "turn_rate_error_rad_s"),
+    "straight": ("path_speed_mps", "turn_rate_rad_s"),
+    "left": ("path_speed_mps", "turn_rate_rad_s"),
+    "right": ("path_speed_mps", "turn_rate_rad_s"),
+}
+"""What the example's page says of each evaluation."""
+
+
+@pytest.mark.parametrize("name", LEAP)
+def test_what_the_page_says_of_the_leap_hand_was_measured(name):
+    shown = json.loads((EXAMPLE / f"leap_eval/{name}.json").read_text("utf-8"))
     bundle = load_bundle(EXAMPLE / "leap_policy")
-    shown = json.loads((EXAMPLE / "leap_eval.json").read_text("utf-8"))
-    steps = bundle.manifest.provenance.normalizer.steps
     assert bundle.manifest.policy.action_size == 16
-    assert shown["steps_trained"] == steps and shown["episodes"] == 256
+    assert shown["steps_trained"] == bundle.manifest.provenance.normalizer.steps
+    text = (EXAMPLE / "README.md").read_text("utf-8").replace("\u2212", "-")
+    means = [f"{shown['measures'][measure]['mean']:.3f}" for measure in LEAP[name]]
+    row = r"\|.*\+?".join(re.escape(mean) for mean in means)
+    assert re.search(row, text, re.DOTALL if name == "training" else 0)
 
 
 def test_what_is_made_for_another_hand_refuses_it(bundle, hand, run, capsys):
