@@ -137,7 +137,7 @@ def test_what_the_page_says_of_the_leap_hand_was_measured(name):
     assert shown["steps_trained"] == bundle.manifest.provenance.normalizer.steps
     text = (EXAMPLE / "README.md").read_text("utf-8").replace("\u2212", "-")
     means = [f"{shown['measures'][measure]['mean']:.3f}" for measure in LEAP[name]]
-    row = r"\|.*\+?".join(re.escape(mean) for mean in means)
+    row = r" \|.*[| +]".join(re.escape(mean) for mean in means)
     assert re.search(row, text, re.DOTALL if name == "training" else 0)
 
 
