@@ -64,8 +64,9 @@ What the paper says about its rewards, tested with our seeds, simulator and budg
 
 **The rule.** Fixed before any of these members was trained: the budget, the evaluation,
 12 seeds compared in pairs, and that nothing is concluded if fewer than 10 of the 12 of
-`ours` reach a task speed of 0.05 m/s. Written later, when the first 27 members were
-known: the interval is Student's t ([statistics](statistics.md)); a difference agrees if
+`ours` reach a task speed of 0.05 m/s. So `ours` alone decides how large a budget is, and
+the other configurations are trained as long as it needs. Written later, when the first
+27 members were known: the interval is Student's t ([statistics](statistics.md)); a difference agrees if
 its interval lies on the paper's side of zero, and disagrees if it lies on the other; a
 claim of no effect disagrees if the interval does not have zero, and agrees if it has
 zero and nothing as large as 0.79 cm/s, the paper's effect of the footprint. Nothing is
