@@ -2,11 +2,13 @@
 
 Actions move targets around the stance; the reward pays for staying up. The model and
 its floor are those that MuJoCo Playground is given; observations are joints, gravity
-and the last action. Neither delay, filter, history nor randomized models.
+and the last action, for walking the palm's velocities too. Neither delay, filter,
+history nor randomized models.
 """
 
 # pyright: reportMissingImports=false
 import functools
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 
@@ -33,9 +35,19 @@ from mjlab.utils.lab_api.math import quat_apply, quat_apply_inverse
 from mjlab.utils.torch import configure_torch_backends
 
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
-from benchmarks.comparison.workers.walking import COMMAND_MPS, TRACKING, WIDTH_MPS
+from benchmarks.comparison.workers.walking import (
+    ACTION_RATE,
+    ALIVE,
+    COMMAND_MPS,
+    LOWEST_M,
+    START_RAD,
+    TRACKING,
+    WIDTH_MPS,
+)
 
 ACTION_SCALE = 0.3
+SPEED = "speed_mps"
+"""Of the palm along the command, in what a step of a walking hand gives beside all."""
 
 
 def make_env(
@@ -56,6 +68,9 @@ def make_env(
         for name in ("joint_pos_rel", "joint_vel_rel", "projected_gravity")
     }
     terms["last_action"] = ObservationTermCfg(func=mdp.last_action)
+    if walks:
+        for name in ("base_lin_vel", "base_ang_vel"):
+            terms[name] = ObservationTermCfg(func=getattr(mdp, name))
     config = ManagerBasedRlEnvCfg(
         scene=SceneCfg(num_envs=worlds, entities={"robot": _entity(mjcf)}),
         observations={
@@ -73,18 +88,13 @@ def make_env(
                 func=mdp.reset_joints_by_offset,
                 mode="reset",
                 params={
-                    "position_range": (-0.02, 0.02),
+                    "position_range": (-START_RAD, START_RAD),
                     "velocity_range": (0.0, 0.0),
                 },
             ),
         },
         rewards=_rewards(walks),
-        terminations={
-            "time_out": TerminationTermCfg(func=mdp.time_out, time_out=True),
-            "low": TerminationTermCfg(
-                func=mdp.root_height_below_minimum, params={"minimum_height": 0.07}
-            ),
-        },
+        terminations=_terminations(walks),
         sim=SimulationCfg(
             nconmax=48,
             njmax=128,
@@ -114,10 +124,21 @@ def velocity(env: ManagerBasedRlEnv) -> tuple[torch.Tensor, torch.Tensor]:
     return (vel_w * ahead).sum(dim=1), across
 
 
+def _terminations(walks: bool) -> dict[str, TerminationTermCfg]:
+    height = {"minimum_height": LOWEST_M}
+    ends = {
+        "time_out": TerminationTermCfg(func=mdp.time_out, time_out=True),
+        "low": TerminationTermCfg(func=mdp.root_height_below_minimum, params=height),
+    }
+    if walks:
+        ends["nan"] = TerminationTermCfg(func=mdp.nan_detection)
+    return ends
+
+
 def _rewards(walks: bool) -> dict[str, RewardTermCfg]:
     paid = {
-        "alive": RewardTermCfg(func=mdp.is_alive, weight=1.0),
-        "smooth": RewardTermCfg(func=mdp.action_rate_l2, weight=-0.01),
+        "alive": RewardTermCfg(func=mdp.is_alive, weight=ALIVE),
+        "smooth": RewardTermCfg(func=mdp.action_rate_l2, weight=ACTION_RATE),
     }
     if walks:
         paid["tracking"] = RewardTermCfg(func=_tracking, weight=TRACKING)
@@ -126,14 +147,20 @@ def _rewards(walks: bool) -> dict[str, RewardTermCfg]:
 
 def _tracking(env: ManagerBasedRlEnv) -> torch.Tensor:
     along, across = velocity(env)
+    env.extras[SPEED] = torch.nan_to_num(along)
     return torch.exp(-((along - COMMAND_MPS) ** 2 + across**2) / WIDTH_MPS**2)
 
 
-def make_runner(env: RslRlVecEnvWrapper, folder: Path, seed: int):
+def make_runner(
+    env: RslRlVecEnvWrapper,
+    folder: Path,
+    seed: int,
+    layers: Sequence[int] = tuple(SETTINGS["layers"]),
+):
     """Makes its learner with the settings that all are given and its own others."""
     model = functools.partial(
         RslRlModelCfg,
-        hidden_dims=tuple(SETTINGS["layers"]),
+        hidden_dims=tuple(layers),
         activation="elu",
         obs_normalization=True,
     )

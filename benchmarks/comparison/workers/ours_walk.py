@@ -4,11 +4,11 @@ import dataclasses
 from importlib.metadata import version
 
 from benchmarks.comparison.workers.report import arguments
-from benchmarks.comparison.workers.walking import ITERATIONS, Walking
+from benchmarks.comparison.workers.walking import ITERATIONS, LAYERS, Walking
 from envs.rounding import fix_rounding
 from fingers_mjx.ppo.config import preset
 from fingers_mjx.ppo.totals import means
-from fingers_mjx.runs.setup import make_env, new_setup
+from fingers_mjx.runs.setup import new_setup, training_env
 from fingers_mjx.training.session import Session
 
 
@@ -18,17 +18,20 @@ def main() -> None:
     args = arguments()
     name = "cpu" if args.device == "cpu" else "fast"
     own = {"num_envs": args.worlds, "seed": args.seed, "backend": args.backend}
+    own |= {"spread_ends": True, "iterations_per_call": 1}
     train = dataclasses.replace(preset(name, "crawl"), **own)
+    layers = {"actor_layers": LAYERS, "critic_layers": LAYERS}
+    train = dataclasses.replace(train, ppo=dataclasses.replace(train.ppo, **layers))
     setup = dataclasses.replace(new_setup(train, None), train=train)
-    session = Session(make_env(setup, args.worlds, args.backend), [setup])
+    session = Session(training_env(setup), [setup])
     about = f"jax {version('jax')}, brax {version('brax')}"
     note = f"crawl, preset {name}, commands of training"
-    walking, carry, length = Walking(args.seconds, about, note), session.start(), 0.0
+    walking, carry = Walking(args.seconds, about, note), session.start()
     for _ in range(ITERATIONS):
         carry, report = session.advance(carry)
         found = means(session.names, report.fetch_sums()[0])
-        length = found.get("episode/length", length)
-        if walking.over(length, found["task_speed_mps"]):
+        falls = found["episode/failed"] / args.worlds
+        if walking.over(train.ppo.unroll_length, found["task_speed_mps"], falls):
             return
 
 

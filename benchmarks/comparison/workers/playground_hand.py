@@ -17,9 +17,18 @@ from mujoco.mjx._src.math import quat_inv, rotate
 from mujoco_playground import MjxEnv, State, step
 from mujoco_playground._src.mjx_env import make_data
 
-from benchmarks.comparison.workers.walking import COMMAND_MPS, TRACKING, WIDTH_MPS
+from benchmarks.comparison.workers.walking import (
+    ACTION_RATE,
+    ALIVE,
+    COMMAND_MPS,
+    LOWEST_M,
+    START_RAD,
+    TRACKING,
+    WIDTH_MPS,
+)
 
 ACTION_SCALE = 0.3
+Judged = tuple[jax.Array, jax.Array, dict[str, jax.Array]]
 ROOM = {"naconmax": 48, "njmax": 128}
 """Contacts and constraints per world that Warp gets space for, as ours."""
 
@@ -48,10 +57,9 @@ class HandStand(MjxEnv):
 
     def reset(self, rng: jax.Array) -> State:
         """Starts near the stance."""
-        noise = 0.02 * jax.random.normal(rng, (self.action_size,))
         data = make_data(
             self._mj_model,
-            qpos=self._stance.at[7:].add(noise),
+            qpos=self._stance.at[7:].add(self._offset_rad(rng)),
             qvel=jnp.zeros(self._mj_model.nv),
             ctrl=self._held,
             impl=self._config.impl,
@@ -60,31 +68,34 @@ class HandStand(MjxEnv):
         data = mjx.forward(self._mjx_model, data)
         zero, last = jnp.zeros(()), jnp.zeros(self.action_size)
         obs = self._seen(data, last)
-        metrics = jax.tree.map(jnp.zeros_like, self._paid(data, zero)[1])
+        metrics = jax.tree.map(jnp.zeros_like, self._judged(data, last, last)[2])
         return State(data, obs, zero, zero, metrics, {"last": last})
 
     def step(self, state: State, action: jax.Array) -> State:
         """Moves the targets and does four physics steps."""
         targets = self._held + ACTION_SCALE * action
         data = step(self._mjx_model, state.data, targets, self.n_substeps)
-        height = jnp.abs(data.qpos[2] - self._stance[2])
-        turned = 1.0 - jnp.abs(data.qpos[3:7] @ self._stance[3:7])
-        upright = jnp.exp(-(height / 0.02) - turned / 0.02)
-        fallen = (height > 0.06) | jnp.isnan(data.qpos).any()
-        obs = self._seen(data, action)
-        reward, metrics = self._paid(data, upright)
+        reward, fallen, metrics = self._judged(data, action, state.info["last"])
         return state.replace(
             data=data,
-            obs=obs,
+            obs=self._seen(data, action),
             reward=reward,
             done=fallen.astype(jnp.float32),
             metrics=metrics,
             info=state.info | {"last": action},
         )
 
-    def _paid(self, data, upright: jax.Array) -> tuple[jax.Array, dict]:
-        """Returns the reward, and what is logged of a step."""
-        return upright, {"upright": upright}
+    def _offset_rad(self, rng: jax.Array) -> jax.Array:
+        """Returns what the joints are off the stance at the start."""
+        return START_RAD * jax.random.normal(rng, (self.action_size,))
+
+    def _judged(self, data, action: jax.Array, last: jax.Array) -> Judged:
+        """Returns the reward, whether the hand fell, and what is logged of a step."""
+        height = jnp.abs(data.qpos[2] - self._stance[2])
+        turned = 1.0 - jnp.abs(data.qpos[3:7] @ self._stance[3:7])
+        upright = jnp.exp(-(height / 0.02) - turned / 0.02)
+        fallen = (height > 0.06) | jnp.isnan(data.qpos).any()
+        return upright, fallen, {"upright": upright}
 
     def _seen(self, data, last: jax.Array) -> jax.Array:
         return jnp.concatenate([data.qpos[2:], data.qvel, last])
@@ -111,15 +122,33 @@ class HandStand(MjxEnv):
 
 
 class HandWalk(HandStand):
-    """A hand that shall walk straight forward; its heading is that of its palm."""
+    """A hand that shall walk straight forward, by the terms that mjlab's is given.
 
-    def _paid(self, data, upright: jax.Array) -> tuple[jax.Array, dict]:
+    Its heading is that of its palm. Rewards are times the control interval, as those
+    of Playground's joystick tasks and of mjlab are.
+    """
+
+    def _offset_rad(self, rng: jax.Array) -> jax.Array:
+        drawn = jax.random.uniform(rng, (self.action_size,), minval=-1.0)
+        return START_RAD * drawn
+
+    def _judged(self, data, action: jax.Array, last: jax.Array) -> Judged:
+        broken = jnp.isnan(data.qpos).any() | jnp.isnan(data.qvel).any()
+        fallen = (data.qpos[2] < LOWEST_M) | broken
         forward_w = jnp.array([1.0, 0.0, 0.0])
         ahead = rotate(rotate(forward_w, quat_inv(self._stance[3:7])), data.qpos[3:7])
         ahead = ahead[:2] / jnp.maximum(jnp.linalg.norm(ahead[:2]), 1e-6)
         along = data.qvel[:2] @ ahead
         across = data.qvel[1] * ahead[0] - data.qvel[0] * ahead[1]
         apart = (along - COMMAND_MPS) ** 2 + across**2
-        tracking = jnp.exp(-apart / WIDTH_MPS**2)
-        metrics = {"upright": upright, "speed_per_step": along}
-        return upright + TRACKING * tracking, metrics
+        tracking = jnp.nan_to_num(jnp.exp(-apart / WIDTH_MPS**2))
+        paid = ALIVE * (1.0 - fallen) + TRACKING * tracking
+        paid += ACTION_RATE * jnp.sum((action - last) ** 2)
+        return paid * self.dt, fallen, {"speed_mps": jnp.nan_to_num(along)}
+
+    def _seen(self, data, last: jax.Array) -> jax.Array:
+        to_palm = quat_inv(data.qpos[3:7])
+        gravity = rotate(jnp.array([0.0, 0.0, -1.0]), to_palm)
+        velocity = (rotate(data.qvel[:3], to_palm), data.qvel[3:])
+        joints = data.qpos[7:] - self._stance[7:]
+        return jnp.concatenate([joints, gravity, *velocity, last])

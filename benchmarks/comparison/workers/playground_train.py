@@ -40,18 +40,15 @@ def train(env, worlds: int, seed: int, iterations: int, **more):
         worlds: stepped side by side.
         seed: of everything.
         iterations: of PPO.
-        more: arguments of Brax's function.
+        more: arguments of Brax's function, in place of those here too.
     """
     parts = SETTINGS["minibatches"]
-    sizes = tuple(SETTINGS["layers"])
-    factory = functools.partial(
-        networks.make_ppo_networks,
-        policy_hidden_layer_sizes=sizes,
-        value_hidden_layer_sizes=sizes,
-    )
+    own = {
+        "wrap_env_fn": wrapper.wrap_for_brax_training,
+        "network_factory": networks_of(SETTINGS["layers"]),
+    }
     return ppo.train(
         environment=env,
-        wrap_env_fn=wrapper.wrap_for_brax_training,
         num_timesteps=iterations * worlds * SETTINGS["unroll"],
         num_envs=worlds,
         unroll_length=SETTINGS["unroll"],
@@ -64,8 +61,16 @@ def train(env, worlds: int, seed: int, iterations: int, **more):
         entropy_cost=1e-2,
         discounting=0.97,
         max_grad_norm=1.0,
-        network_factory=factory,
         seed=seed,
         run_evals=False,
-        **more,
+        **(own | more),
+    )
+
+
+def networks_of(layers):
+    """Returns what makes Brax's networks, both of these hidden sizes."""
+    return functools.partial(
+        networks.make_ppo_networks,
+        policy_hidden_layer_sizes=tuple(layers),
+        value_hidden_layer_sizes=tuple(layers),
     )

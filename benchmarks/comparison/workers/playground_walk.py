@@ -4,10 +4,16 @@
 from importlib.metadata import version
 
 from benchmarks.comparison.workers.playground_hand import HandWalk
-from benchmarks.comparison.workers.playground_train import train
+from benchmarks.comparison.workers.playground_train import networks_of, train
+from benchmarks.comparison.workers.playground_watched import watching
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 from benchmarks.comparison.workers.report import arguments
-from benchmarks.comparison.workers.walking import COMMAND_MPS, ITERATIONS, Walking
+from benchmarks.comparison.workers.walking import (
+    COMMAND_MPS,
+    ITERATIONS,
+    LAYERS,
+    Walking,
+)
 
 
 def main() -> None:
@@ -18,17 +24,12 @@ def main() -> None:
     note = f"same hand, {COMMAND_MPS} m/s forward, MJX on {args.backend}"
     walking = Walking(args.seconds, about, note)
 
-    def progress(steps: int, metrics: dict) -> None:
-        length, speed = (
-            float(metrics.get(f"episode/{name}", 0.0))
-            for name in ("length", "speed_per_step")
-        )
-        walking.over(length, speed)
+    def look(speed_mps: float, falls: float) -> None:
+        walking.over(SETTINGS["unroll"], speed_mps, falls)
 
     env = HandWalk(args.mjcf, args.backend, args.worlds)
-    more = {"log_training_metrics": True, "progress_fn": progress}
-    more["training_metrics_steps"] = args.worlds * SETTINGS["unroll"]
-    train(env, args.worlds, args.seed, ITERATIONS, **more)
+    own = {"wrap_env_fn": watching(look), "network_factory": networks_of(LAYERS)}
+    train(env, args.worlds, args.seed, ITERATIONS, **own)
 
 
 if __name__ == "__main__":
