@@ -148,6 +148,9 @@ def _searched(problem: Problem, base: Model) -> Search:
             alternatives[best.effects[0]] = [m for m in stage if m is not winner]
     if len(best.effects) == 1 and best.effects[0] in alternatives:
         without = {best.effects[0]: base}
+        if not judge.confirms(base, best):
+            stage = [best, *alternatives[best.effects[0]]]
+            best, alternatives, without = base, {}, {}
     else:
         best, alternatives, without = exchanged(problem, best, base, judge)
     rejected = [m for m in stage if set(best.effects) < set(m.effects)]
@@ -167,12 +170,17 @@ def _fullest(better: list[Model]) -> Model:
 
 
 def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | None:
-    """Chooses the first effect with which the simulation comes nearer."""
+    """Chooses the first effect with which the simulation comes nearer.
+
+    If it is not much nearer with any, one that matters beside another may be there:
+    what the other does is part of the error. It goes at the end if it does not.
+    """
     if not better:
         return None
     first = _fullest(better)
     order = [first, *(m for m in better if m is not first)][:TRIED]
-    return next((m for m in order if judge.confirms(smaller, m)), None)
+    nearer = [m for m in order if judge.prefers(smaller, m)]
+    return next((m for m in nearer if judge.confirms(smaller, m)), (*nearer, None)[0])
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
@@ -219,13 +227,13 @@ def exchanged(
     """Lets other effects take the places of causes while that is better.
 
     The first cause of several was chosen when it stood for all of them. One that is not
-    accepted together with the others goes.
+    accepted together with the others goes, that with the least evidence first.
 
     Returns:
         The model, and for each cause its alternatives and the model without it.
     """
     samples = problem.samples
-    for _ in range(MOST):
+    for _ in range(2 * MOST):
         others, without = swapped(problem, best, base)
         idle = [
             c
@@ -234,7 +242,8 @@ def exchanged(
             or not judge.confirms(without[c], best)
         ]
         if idle:
-            best = without[idle[0]]
+            gaps = {c: likelihood_gap(without[c], best, samples) for c in idle}
+            best = without[min(gaps, key=gaps.__getitem__)]
             continue
         for cause, stage in others.items():
             gain = likelihood_gap(without[cause], best, samples)

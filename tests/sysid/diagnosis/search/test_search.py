@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from sysid.diagnosis.search.candidate import Model, log_likelihood_gain
-from sysid.diagnosis.search.search import _fullest
+from sysid.diagnosis.search.search import _confirmed, _fullest
 from sysid.diagnosis.search.selection import explained_gain
 from sysid.diagnosis.search.stage import _fits_in
 from sysid.least_squares import Fit
@@ -57,3 +57,20 @@ def test_one_that_explains_what_the_first_does_not_goes_before_it():
     assert _fullest([first, full]) is full
     assert _fullest([first, model(0.0, (3.0, 1.0))]) is first
     assert _fullest([model(0.0, (1.3, 1.0)), full]).errors[0] == 1.3
+
+
+def test_one_that_may_matter_beside_another_goes_on_if_none_matters_alone():
+    """And only then: what matters comes first, though another is better in theory."""
+    base, *others = (model(float(n)) for n in range(4))
+    wrong, nearer, matters = others
+
+    def said(nearer_ones, matter):
+        judge: Any = SimpleNamespace(
+            prefers=lambda smaller, larger: any(larger is m for m in nearer_ones),
+            confirms=lambda smaller, larger: any(larger is m for m in matter),
+        )
+        return _confirmed(judge, base, others)
+
+    assert said([nearer, matters], [matters]) is matters
+    assert said([nearer, matters], []) is nearer
+    assert said([], [wrong]) is None  # a simulation that comes no nearer
