@@ -64,17 +64,17 @@ What the paper says about its rewards, tested with our seeds, simulator and budg
 
 **The rule.** Fixed before any of these members was trained: the budget, the evaluation,
 12 seeds compared in pairs, and that nothing is concluded if fewer than 10 of the 12 of
-`ours` reach a task speed of 0.05 m/s. So `ours` alone decides how large a budget is, and
-the other configurations are trained as long as it needs. Written later, when the first
-27 members were known: the interval is Student's t ([statistics](statistics.md)); a difference agrees if
-its interval lies on the paper's side of zero, and disagrees if it lies on the other; a
-claim of no effect disagrees if the interval does not have zero, and agrees if it has
-zero and nothing as large as 0.79 cm/s, the paper's effect of the footprint. Nothing is
-judged before all {seeds} members of both, the seeds 0 to {last}, are done. Written
-last, also after the first 27 were known: a member that diverged twice, or that failed
-and was not started again, is left out of its pairs and named, and so is one in which no
-episode defines the measure; the other pairs are judged. A member of `ours` that is left
-out counts as one that does not walk.
+`ours` reach a task speed of 0.05 m/s. So `ours` alone decides how large a budget is,
+and the other configurations are trained as long as it needs. Written later, when the
+first 27 members were known: the interval is Student's t ([statistics](statistics.md));
+a difference agrees if its interval lies on the paper's side of zero, and disagrees if
+it lies on the other; a claim of no effect disagrees if the interval does not have zero,
+and agrees if it has zero and nothing as large as 0.79 cm/s, the paper's effect of the
+footprint. Nothing is judged before all {seeds} members of both, the seeds 0 to {last},
+are done. Written last, also after the first 27 were known: a member that diverged
+twice, or that failed and was not started again, is left out of its pairs and named, and
+so is one in which no episode defines the measure; the other pairs are judged. A member
+of `ours` that is left out counts as one that does not walk.
 
 This is the third budget. Under the first, too small by the same rule, `no_direction`
 was above `ours` (+2.1 cm/s, p = 0.03 after Holm, seven seeds); what became of both is
