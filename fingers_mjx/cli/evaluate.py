@@ -41,8 +41,7 @@ def add(commands) -> None:
     parser.add_argument(
         "--nominal", action="store_true", help="the nominal hand, without noise"
     )
-    what = "a setting of the task such as env.episode_s=10"
-    options.settings(parser, f"{what}; --help after POLICY lists all, each a flag too")
+    options.settings(parser, options.TASK_SETTING_HELP)
     options.path(parser, "--json", help="summary to write")
     what = "summary, table and figures go here"
     options.path(parser, "--out", metavar="DIR", help=what)

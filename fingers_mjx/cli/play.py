@@ -41,8 +41,7 @@ def add(commands) -> None:
     options.offer_settings(parser, options.policy_settings, _preview)
     what = f"{options.POLICY_HELP}; --viewer takes the committed crawl policy"
     options.path(parser, "policy", metavar="POLICY", nargs="?", help=what)
-    what = "a setting of the task such as env.episode_s=10"
-    options.settings(parser, f"{what}; --help after POLICY lists all, each a flag too")
+    options.settings(parser, options.TASK_SETTING_HELP)
     _add_viewer(parser)
     options.path(
         parser,

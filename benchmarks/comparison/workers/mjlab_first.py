@@ -1,9 +1,7 @@
 """mjlab's first iteration of RSL-RL's PPO on the same hand."""
 
 # pyright: reportMissingImports=false
-from importlib.metadata import version
-
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner
+from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
 from benchmarks.comparison.workers.report import arguments, say
 
 
@@ -13,9 +11,7 @@ def main() -> None:
     device = "cpu" if args.device == "cpu" else "cuda:0"
     env = make_env(args.mjcf, args.worlds, device, args.seed)
     make_runner(env, args.out, args.seed).learn(num_learning_iterations=1)
-    about = f"mjlab {version('mjlab')}, rsl-rl-lib {version('rsl-rl-lib')}"
-    about += f", warp {version('warp-lang')}, torch {version('torch')}"
-    say(first=True, version=about, note="same hand standing, MuJoCo Warp")
+    say(first=True, version=versions(), note="same hand standing, MuJoCo Warp")
 
 
 if __name__ == "__main__":

@@ -10,6 +10,7 @@ history nor randomized models.
 import functools
 from collections.abc import Sequence
 from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 
 import mujoco
@@ -183,6 +184,12 @@ def make_runner(
     )
     folder.mkdir(parents=True, exist_ok=True)
     return MjlabOnPolicyRunner(env, asdict(config), str(folder), str(env.device))
+
+
+def versions() -> str:
+    """Names what trains, with the versions that are installed."""
+    learner = f"mjlab {version('mjlab')}, rsl-rl-lib {version('rsl-rl-lib')}"
+    return f"{learner}, warp {version('warp-lang')}, torch {version('torch')}"
 
 
 def _entity(mjcf: Path) -> EntityCfg:

@@ -1,9 +1,7 @@
 """RSL-RL's PPO on the hand of mjlab until its hands stand."""
 
 # pyright: reportMissingImports=false
-from importlib.metadata import version
-
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner
+from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
 from benchmarks.comparison.workers.mjlab_watched import Seen, Watched
 from benchmarks.comparison.workers.report import STANDING_STEPS, arguments, say
 
@@ -14,14 +12,12 @@ def main() -> None:
     """Trains until episodes that end are long, and says so."""
     args = arguments()
     device = "cpu" if args.device == "cpu" else "cuda:0"
-    about = f"mjlab {version('mjlab')}, rsl-rl-lib {version('rsl-rl-lib')}"
-    about += f", warp {version('warp-lang')}, torch {version('torch')}"
     said = []
 
     def look(seen: Seen) -> None:
         if not said and seen.length >= STANDING_STEPS:
             said.append(seen)
-            say(first=True, version=about, note="same hand standing, MuJoCo Warp")
+            say(first=True, version=versions(), note="same hand standing, MuJoCo Warp")
 
     env = Watched(make_env(args.mjcf, args.worlds, device, args.seed).env, look)
     make_runner(env, args.out, args.seed).learn(num_learning_iterations=ITERATIONS)

@@ -1,9 +1,7 @@
 """RSL-RL's PPO on the hand of mjlab, paid for walking, for a given time."""
 
 # pyright: reportMissingImports=false
-from importlib.metadata import version
-
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner
+from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
 from benchmarks.comparison.workers.mjlab_watched import Seen, Watched
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 from benchmarks.comparison.workers.report import arguments
@@ -19,10 +17,8 @@ def main() -> None:
     """Trains until the time is over, and says how fast the hand walks."""
     args = arguments()
     device = "cpu" if args.device == "cpu" else "cuda:0"
-    about = f"mjlab {version('mjlab')}, rsl-rl-lib {version('rsl-rl-lib')}"
-    about += f", warp {version('warp-lang')}, torch {version('torch')}"
     note = f"same hand, {COMMAND_MPS} m/s forward, MuJoCo Warp"
-    walking = Walking(args.seconds, about, note)
+    walking = Walking(args.seconds, versions(), note)
 
     def look(seen: Seen) -> None:
         walking.over(SETTINGS["unroll"], seen.speed_mps, seen.falls)

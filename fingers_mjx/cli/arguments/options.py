@@ -26,6 +26,10 @@ MAX_SEED = 2**32 - 1
 MOST = 10**6
 """Beyond any number of episodes, steps or seconds that ends within days."""
 POLICY_HELP = "run directory, exported bundle directory or its policy.onnx"
+TASK_SETTING_HELP = (
+    "a setting of the task such as env.episode_s=10; --help after POLICY lists all, "
+    "each a flag too"
+)
 
 
 def command(

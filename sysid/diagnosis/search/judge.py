@@ -231,9 +231,10 @@ class Judge:
 
     def confirms(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better, and by enough to matter."""
-        if not (self.sees and self.prefers(smaller, larger)):
-            return not self.sees
-        return self.fall(*self.pair(smaller, larger)) > LEAST_FALL
+        if not self.sees:
+            return True
+        matters = self.prefers(smaller, larger)
+        return matters and self.fall(*self.pair(smaller, larger)) > LEAST_FALL
 
     def prefers(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better than the smaller one."""

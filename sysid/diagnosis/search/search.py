@@ -179,8 +179,12 @@ def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | Non
         return None
     first = _fullest(better)
     order = [first, *(m for m in better if m is not first)][:TRIED]
-    nearer = [m for m in order if judge.prefers(smaller, m)]
-    return next((m for m in nearer if judge.confirms(smaller, m)), (*nearer, None)[0])
+    nearer = None
+    for model in (m for m in order if judge.prefers(smaller, m)):
+        if judge.confirms(smaller, model):
+            return model
+        nearer = nearer or model
+    return nearer
 
 
 def settled(problem: Problem) -> tuple[Problem, Model]:
