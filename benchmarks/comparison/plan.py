@@ -116,6 +116,7 @@ def _walks(device: str, mjlab: str) -> tuple[Job, ...]:
         return ()
     named = {
         "walk": ours("ours_walk", "warp"),
+        "straight-walk": ours("ours_straight", "warp"),
         "playground-walk": playground("playground_walk", "warp"),
         "mjlab-walk": Worker(mjlab, "mjlab", "mjlab_walk"),
     }

@@ -1,6 +1,7 @@
 """This project's crawl, trained with a preset for a given time."""
 
 import dataclasses
+from collections.abc import Callable
 from importlib.metadata import version
 
 from benchmarks.comparison.workers.report import arguments
@@ -8,12 +9,22 @@ from benchmarks.comparison.workers.walking import ITERATIONS, LAYERS, Walking
 from envs.rounding import fix_rounding
 from fingers_mjx.ppo.config import preset
 from fingers_mjx.ppo.totals import means
-from fingers_mjx.runs.setup import new_setup, training_env
+from fingers_mjx.runs.setup import Setup, new_setup, training_env
 from fingers_mjx.training.session import Session
 
 
 def main() -> None:
     """Trains until the time is over, and says how fast the hand walks."""
+    train_to_walk(lambda setup: setup, "commands of training")
+
+
+def train_to_walk(changed: Callable[[Setup], Setup], note: str) -> None:
+    """Trains the crawl with the changes to its settings that `changed` makes.
+
+    Args:
+        changed: takes the preset's settings and returns those to train with.
+        note: what these are, for the row.
+    """
     fix_rounding()
     args = arguments()
     name = "cpu" if args.device == "cpu" else "fast"
@@ -22,11 +33,11 @@ def main() -> None:
     train = dataclasses.replace(preset(name, "crawl"), **own)
     layers = {"actor_layers": LAYERS, "critic_layers": LAYERS}
     train = dataclasses.replace(train, ppo=dataclasses.replace(train.ppo, **layers))
-    setup = dataclasses.replace(new_setup(train, None), train=train)
+    setup = changed(dataclasses.replace(new_setup(train, None), train=train))
     session = Session(training_env(setup), [setup])
     about = f"jax {version('jax')}, brax {version('brax')}"
-    note = f"crawl, preset {name}, commands of training"
-    walking, carry = Walking(args.seconds, about, note), session.start()
+    walking = Walking(args.seconds, about, f"crawl, preset {name}, {note}")
+    carry = session.start()
     for _ in range(ITERATIONS):
         carry, report = session.advance(carry)
         found = means(session.names, report.fetch_sums()[0])
