@@ -1,7 +1,7 @@
-"""This project's hand on what the walking peers are asked for: straight on, undisturbed.
+"""This project's hand on what the walking peers are asked for: straight on, calm.
 
 The crawl with one nominal hand, no noise, the peers' one command and rewards of the
-literature without a term for the gait. Drive, delay, history and estimated signals stay.
+literature without a term for the gait. Drive, delay and history stay.
 """
 
 from benchmarks.comparison.workers.ours_walk import train_to_walk
