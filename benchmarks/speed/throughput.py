@@ -15,7 +15,6 @@ Layers "... by substep" call Warp once a physics step instead of once a control 
 import argparse
 import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -35,6 +34,7 @@ from envs.physics.backends import BACKENDS, default_backend
 from envs.registry import make_batch, task_names
 from envs.rounding import fix_rounding
 from fingers_mjx.reports.page import commit_here
+from fingers_mjx.runs.machine import machine
 
 ROUNDS = 5
 Key = tuple[str, str]
@@ -164,12 +164,6 @@ def _ratios(
         factor = own["environment"] / rates[against, "environment"]
         ratios[f"environment: {backend} / {against}"] = factor
     return ratios
-
-
-def machine() -> str:
-    """What the numbers were taken on; nothing that names the machine."""
-    device = jax.devices()[0].device_kind
-    return f"{os.cpu_count()} cores ({platform.machine()}), JAX on {device}"
 
 
 def provenance() -> dict[str, object]:

@@ -52,8 +52,10 @@ def run(args: argparse.Namespace) -> int:
     from fingers_mjx.evaluation.steering.commands import obeyed
     from fingers_mjx.evaluation.steering.heading_hold import held
     from fingers_mjx.evaluation.steering.worlds import Course
+    from fingers_mjx.policy.digest import digest
     from fingers_mjx.policy.source import load_source
     from fingers_mjx.reports.page import commit_here
+    from fingers_mjx.runs.machine import machine
     from fingers_mjx.runs.setup import overridden
     from fingers_mjx.training.counting import counting
     from fingers_robot.behaviour.heading import HeadingConfig
@@ -75,6 +77,8 @@ def run(args: argparse.Namespace) -> int:
         {
             "policy": source.name,
             "steps_trained": source.steps_trained,
+            "policy_sha256": digest(source.network),
+            "machine": machine(),
             "commit": commit_here(),
             "conditions": conditions | {"settings": args.settings},
             "controller": {"gain": args.gain, "offset_rad_s": args.offset},

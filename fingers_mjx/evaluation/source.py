@@ -27,9 +27,11 @@ from fingers_mjx.evaluation.files import (
 from fingers_mjx.evaluation.measures import CONTACT_N
 from fingers_mjx.evaluation.setups import with_fields
 from fingers_mjx.policy.actor import acting_together
+from fingers_mjx.policy.digest import digest
 from fingers_mjx.policy.source import PolicySource
 from fingers_mjx.reports import figures
 from fingers_mjx.reports.page import commit_here
+from fingers_mjx.runs.machine import machine
 from fingers_mjx.runs.setup import make_env
 
 MAX_WORLDS = 4096
@@ -115,7 +117,8 @@ def summary(
         seed: of the evaluation.
     """
     task, steps = source.setup.train.task, source.steps_trained
-    return summary_document(columns, task, source.name, seed, steps, commit_here())
+    found = summary_document(columns, task, source.name, seed, steps, commit_here())
+    return {**found, "policy_sha256": digest(source.network), "machine": machine()}
 
 
 def document(

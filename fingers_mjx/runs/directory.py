@@ -3,7 +3,7 @@
 config.yaml     resolved configuration
 hand.yaml       the hand
 run.json        what a resumed run must share, and the format of this directory
-versions.json   packages, Python, platform, commit (no host or user names)
+versions.json   packages, Python, platform, machine, commit (no host or user names)
 metrics.jsonl   learning curve; events.out.tfevents.0: the same for TensorBoard
 checkpoints/    whole training states
 eval/           evaluations
@@ -29,6 +29,7 @@ from envs.config.typed import dump_yaml
 from envs.errors import InputError
 from fingers_deploy.files import is_folder
 from fingers_mjx.runs.files import write_whole
+from fingers_mjx.runs.machine import machine
 
 if TYPE_CHECKING:
     from envs.hand.hand_file import HandFile
@@ -137,12 +138,13 @@ def check_bound(
 
 
 def versions() -> dict[str, Any]:
-    """Returns versions of packages, Python and platform, and the commit if any."""
+    """Returns packages, Python, platform, machine, and the commit if any."""
     packages = {name: _version(name) for name in PACKAGES}
     return {
         "packages": {k: v for k, v in packages.items() if v},
         "python": platform.python_version(),
         "platform": f"{platform.system()} {platform.machine()}",
+        "machine": machine(),
         "commit": _commit(),
     }
 

@@ -12,6 +12,7 @@ from envs.hand.stance import load_stance
 from fingers_mjx.cli.main import main
 from fingers_mjx.demo.demo import POLICY_DIR
 from fingers_mjx.evaluation.files import read_table
+from fingers_mjx.policy.digest import digest
 from fingers_mjx.policy.source import load_source
 from fingers_mjx.runs import checkpoint
 from fingers_mjx.runs.files import OutOfSpace
@@ -94,6 +95,8 @@ def test_evaluation_of_a_run_is_kept_with_it(bundle_dir, run_dir):
     found = [summary[name] for name in ("task", "policy", "episodes", "seed")]
     assert found == ["crawl", "run", 3, 0]  # and not the way to it
     assert summary["steps_trained"] == load_source(run_dir).steps_trained
+    checkpoint_of, bundle_of = (load_source(x).network for x in (run_dir, bundle_dir))
+    assert summary["policy_sha256"] == digest(checkpoint_of) == digest(bundle_of)
     assert set(summary["measures"]) >= MEASURES
     for measure in summary["measures"].values():
         assert set(measure) >= {"mean", "std", "n"}

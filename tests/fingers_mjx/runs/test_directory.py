@@ -79,7 +79,7 @@ def test_what_is_written_names_nobody_and_is_readable(tmp_path):
     }
     assert {p.stat().st_mode & 0o777 for p in files} == {0o644}
     versions = json.loads((path / "versions.json").read_text(encoding="utf-8"))
-    assert set(versions) == {"packages", "python", "platform", "commit"}
+    assert set(versions) == {"packages", "python", "platform", "machine", "commit"}
     assert versions["packages"]["jax"]
 
 
