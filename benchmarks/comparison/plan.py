@@ -72,20 +72,20 @@ def jobs(device: str) -> tuple[Job, ...]:
     """Returns all measurements that make sense on a device."""
     backends = ("cpu", "jax") if device == "cpu" else ("warp",)
     impls = ("jax",) if device == "cpu" else ("warp", "jax")
-    fast = tuple(ours("ours_speed", name) for name in backends)
-    first = (ours("ours_first", backends[0]), playground("playground_first", impls[0]))
-    stand = (ours("ours_stand", backends[0]), playground("playground_stand", impls[0]))
-    fast += tuple(playground("playground_speed", impl) for impl in impls)
-    mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab_speed")
+    fast = tuple(ours("ours.speed", name) for name in backends)
+    first = (ours("ours.first", backends[0]), playground("playground.first", impls[0]))
+    stand = (ours("ours.stand", backends[0]), playground("playground.stand", impls[0]))
+    fast += tuple(playground("playground.speed", impl) for impl in impls)
+    mjlab = Worker("mjlab, RSL-RL PPO", "mjlab", "mjlab.speed")
     # Rates on CPUs keep the jobs that their rows were taken in.
     alone = SIZES[device] if device == "cpu" else ()
     fast += (mjlab,) if device == "gpu" else ()
-    mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab_first")
-    mjlab_stand = (Worker(mjlab.peer, "mjlab", "mjlab_stand"),)
+    mjlab_first = Worker(mjlab.peer, "mjlab", "mjlab.first")
+    mjlab_stand = (Worker(mjlab.peer, "mjlab", "mjlab.stand"),)
     resumed = (
-        ours("ours_resume", backends[0]),
-        playground("playground_resume", impls[0]),
-        Worker(mjlab.peer, "mjlab", "mjlab_resume"),
+        ours("ours.resume", backends[0]),
+        playground("playground.resume", impls[0]),
+        Worker(mjlab.peer, "mjlab", "mjlab.resume"),
     )
     unilab = Worker("UniLab, RSL-RL PPO", "unilab", "unilab_first")
     fits = Worker("mujoco.sysid", "sysid", "sysid_fit")
@@ -115,10 +115,10 @@ def _walks(device: str, mjlab: str) -> tuple[Job, ...]:
     if device == "cpu":
         return ()
     named = {
-        "walk": ours("ours_walk", "warp"),
-        "straight-walk": ours("ours_straight", "warp"),
-        "playground-walk": playground("playground_walk", "warp"),
-        "mjlab-walk": Worker(mjlab, "mjlab", "mjlab_walk"),
+        "walk": ours("ours.walk", "warp"),
+        "straight-walk": ours("ours.straight", "warp"),
+        "playground-walk": playground("playground.walk", "warp"),
+        "mjlab-walk": Worker(mjlab, "mjlab", "mjlab.walk"),
     }
     worlds = STAND_WORLDS[device]
     return tuple(Job(n, "learn", WALKING, (w,), worlds) for n, w in named.items())

@@ -3,8 +3,8 @@
 # pyright: reportMissingImports=false
 from importlib.metadata import version
 
-from benchmarks.comparison.workers.playground_hand import HandStand
-from benchmarks.comparison.workers.playground_train import train
+from benchmarks.comparison.workers.playground.hand import HandStand
+from benchmarks.comparison.workers.playground.train import train
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 from benchmarks.comparison.workers.report import STANDING_STEPS, arguments, say
 

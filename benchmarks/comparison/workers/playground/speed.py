@@ -6,7 +6,7 @@ from importlib.metadata import version
 import jax
 from mujoco_playground import wrapper
 
-from benchmarks.comparison.workers.playground_hand import HandStand
+from benchmarks.comparison.workers.playground.hand import HandStand
 from benchmarks.comparison.workers.report import STEPS_PER_CALL, arguments, serve
 
 

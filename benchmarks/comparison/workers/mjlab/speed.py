@@ -5,7 +5,7 @@ from importlib.metadata import version
 
 import torch
 
-from benchmarks.comparison.workers.mjlab_hand import make_env
+from benchmarks.comparison.workers.mjlab.hand import make_env
 from benchmarks.comparison.workers.report import STEPS_PER_CALL, arguments, serve
 
 

@@ -1,8 +1,8 @@
 """RSL-RL's PPO on the hand of mjlab until its hands stand."""
 
 # pyright: reportMissingImports=false
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
-from benchmarks.comparison.workers.mjlab_watched import Seen, Watched
+from benchmarks.comparison.workers.mjlab.hand import make_env, make_runner, versions
+from benchmarks.comparison.workers.mjlab.watched import Seen, Watched
 from benchmarks.comparison.workers.report import STANDING_STEPS, arguments, say
 
 ITERATIONS = 3000

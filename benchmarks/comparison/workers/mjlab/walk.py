@@ -1,8 +1,8 @@
 """RSL-RL's PPO on the hand of mjlab, paid for walking, for a given time."""
 
 # pyright: reportMissingImports=false
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
-from benchmarks.comparison.workers.mjlab_watched import Seen, Watched
+from benchmarks.comparison.workers.mjlab.hand import make_env, make_runner, versions
+from benchmarks.comparison.workers.mjlab.watched import Seen, Watched
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 from benchmarks.comparison.workers.report import arguments
 from benchmarks.comparison.workers.walking import (

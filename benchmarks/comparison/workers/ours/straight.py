@@ -4,7 +4,7 @@ The crawl with one nominal hand, no noise, the peers' one command and rewards of
 literature without a term for the gait. Drive, delay and history stay.
 """
 
-from benchmarks.comparison.workers.ours_walk import train_to_walk
+from benchmarks.comparison.workers.ours.walk import train_to_walk
 from benchmarks.comparison.workers.walking import COMMAND_MPS, START_RAD
 from fingers_mjx.evaluation.setups import nominal, with_command, with_fields
 from fingers_mjx.runs.setup import Setup

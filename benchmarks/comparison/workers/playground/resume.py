@@ -7,8 +7,8 @@ import jax
 import numpy as np
 
 from benchmarks.comparison.plan import playground
-from benchmarks.comparison.workers.playground_hand import HandStand
-from benchmarks.comparison.workers.playground_train import train
+from benchmarks.comparison.workers.playground.hand import HandStand
+from benchmarks.comparison.workers.playground.train import train
 from benchmarks.comparison.workers.report import DIFFERENCE, arguments, largest, say
 
 HALF = 2
@@ -32,7 +32,7 @@ def main() -> None:
     about = f"playground {version('playground')}, brax {version('brax')}"
     note = f"Brax's checkpoint restored after {HALF} of {2 * HALF} iterations; it holds"
     note += " networks and normalizer, neither optimizer, worlds nor random key"
-    peer = playground("playground_resume", args.backend).peer
+    peer = playground("playground.resume", args.backend).peer
     shared = {"peer": peer, "version": about, "unit": "1"}
     apart = largest(whole, rest)
     say(quantity=DIFFERENCE, value=apart, note=note, **shared)

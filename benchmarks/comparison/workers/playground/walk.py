@@ -3,9 +3,9 @@
 # pyright: reportMissingImports=false
 from importlib.metadata import version
 
-from benchmarks.comparison.workers.playground_hand import HandWalk
-from benchmarks.comparison.workers.playground_train import networks_of, train
-from benchmarks.comparison.workers.playground_watched import watching
+from benchmarks.comparison.workers.playground.hand import HandWalk
+from benchmarks.comparison.workers.playground.train import networks_of, train
+from benchmarks.comparison.workers.playground.watched import watching
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 from benchmarks.comparison.workers.report import arguments
 from benchmarks.comparison.workers.walking import (

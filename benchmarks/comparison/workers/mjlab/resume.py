@@ -8,7 +8,7 @@ import numpy as np
 import onnxruntime
 import torch
 
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner
+from benchmarks.comparison.workers.mjlab.hand import make_env, make_runner
 from benchmarks.comparison.workers.report import (
     DIFFERENCE,
     EXPORT,

@@ -1,7 +1,7 @@
 """mjlab's first iteration of RSL-RL's PPO on the same hand."""
 
 # pyright: reportMissingImports=false
-from benchmarks.comparison.workers.mjlab_hand import make_env, make_runner, versions
+from benchmarks.comparison.workers.mjlab.hand import make_env, make_runner, versions
 from benchmarks.comparison.workers.report import arguments, say
 
 

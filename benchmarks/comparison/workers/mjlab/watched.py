@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import torch
 from mjlab.rl import RslRlVecEnvWrapper
 
-from benchmarks.comparison.workers.mjlab_hand import SPEED
+from benchmarks.comparison.workers.mjlab.hand import SPEED
 from benchmarks.comparison.workers.ppo_settings import SETTINGS
 
 

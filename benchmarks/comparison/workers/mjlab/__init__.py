@@ -1,0 +1,1 @@
+"""mjlab with RSL-RL, on the hand."""

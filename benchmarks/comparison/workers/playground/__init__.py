@@ -1,0 +1,1 @@
+"""MuJoCo Playground with Brax PPO, on the hand."""
