@@ -6,19 +6,20 @@ steps knows no moment at which a limit is met, so what fits it best may not move
 So the simulation is fitted to the angle with and without the effect (`closed_loop`),
 each time without the stretch that is predicted, and without the effect within the
 tolerances of its parameters: an error that a parameter out of its tolerance would hide
-is there. With their angle
-errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over its blocks,
+is there. With their angle errors e₀ and e₁ there, and the means d_b of e₀² − e₁² over
+its blocks,
 
     t = d̄ √B / s_d
 
 must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
 parameter that leaves its tolerance. And it must matter: the root mean square of the
-error must fall by the share `LEAST_FALL`. Gains of a servo that nobody knows are, with
-and without the effect, those that the logged effort shows to that model, as surely as
-it does: free ones would do in the simulation what the effect does. The likelihood need
-not gain where repeats show that the logged effort has no other explanation: what
-parameters a little out of their tolerances hide of the angle, as a servo's damping
-hides friction, they do not hide of the effort.
+error must fall by the share `LEAST_FALL`, or, where repeats show its noise, from
+clearly more to about that. Gains of a servo that nobody knows are, with and without the
+effect, those that the logged effort shows to that model, as surely as it does: free
+ones would do in the simulation what the effect does. The likelihood need not gain where
+repeats show that the logged effort has no other explanation: what parameters a little
+out of their tolerances hide of the angle, as a servo's damping hides friction, they do
+not hide of the effort.
 """
 
 from dataclasses import replace
@@ -233,8 +234,15 @@ class Judge:
         """Whether the larger model predicts angles better, and by enough to matter."""
         if not self.sees:
             return True
-        matters = self.prefers(smaller, larger)
-        return matters and self.fall(*self.pair(smaller, larger)) > LEAST_FALL
+        return self.prefers(smaller, larger) and self._matters(smaller, larger)
+
+    def _matters(self, smaller: Model, larger: Model) -> bool:
+        """Whether of the angle's error much goes, or all that is more than noise."""
+        worse, better = self.pair(smaller, larger)
+        if self.fall(worse, better) > LEAST_FALL:
+            return True
+        before, after = worse.errors.max(), better.errors.max()
+        return bool(self.problem.repeat and before > LEFT > after)
 
     def prefers(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better than the smaller one."""

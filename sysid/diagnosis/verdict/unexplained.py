@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
-from sysid.diagnosis.search.judge import LEFT, REMAINING
+from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
 from sysid.diagnosis.search.output_error import OutputProblem
 from sysid.diagnosis.search.output_starts import settled_output
 from sysid.diagnosis.search.problem import Problem
@@ -81,7 +81,16 @@ def _left(found: Search) -> _Left:
         base = fit_models(problem, [()], [base.fit.theta], rounds=10)[0]
         return _Left(problem, base, best, sure=True)
     sure = isinstance(judge.output, OutputProblem) or bool(problem.repeat)
-    return _Left(judge.output, judge.moved(base), judge.moved(best), sure)
+    return _Left(judge.output, _nearest(judge, base), _nearest(judge, best), sure)
+
+
+def _nearest(judge: Judge, model: Model) -> Model:
+    """Returns the nearer fit to the angle: with all free, or with the effort's gains.
+
+    Gains that nobody knows may lead the first into a valley of their own.
+    """
+    fits = (judge.moved(model), judge.serving(model).moved(model))
+    return min(fits, key=lambda m: float(m.errors.sum()))
 
 
 def _remaining(left: _Left) -> list[str]:

@@ -13,7 +13,12 @@ ENOUGH = 2.0 * NOMINAL_THRESHOLD
 
 
 class Said(Judge):
-    """A judge whose simulations gain so much, differ so clearly, and fall so far."""
+    """A judge whose simulations gain so much, differ so clearly, and fall so far.
+
+    The angle's errors, in units of its noise, are those of `angle` before and after.
+    """
+
+    angle = (1.0, 1.0)
 
     def __init__(self, gain, t, repeat=True, effort=True, fall=2.0 * LEAST_FALL):
         data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
@@ -24,9 +29,10 @@ class Said(Judge):
         self.output = SimpleNamespace(samples=4)
 
     def moved(self, model):
-        return model
+        return SimpleNamespace(**vars(model) | {"errors": np.array([self.angle[1]])})
 
-    nominal = moved
+    def nominal(self, model):
+        return SimpleNamespace(**vars(model) | {"errors": np.array([self.angle[0]])})
 
     def t_value(self, worse, better):
         return self.t
@@ -62,6 +68,22 @@ def test_a_difference_that_is_sure_but_small_is_no_cause():
     assert not says(small)
     nothing, cause = SimpleNamespace(), SimpleNamespace(gain=ENOUGH)
     assert small.prefers(nothing, cause)  # beside a cause that counts
+
+
+@pytest.mark.parametrize(
+    ("angle", "repeat", "matters"),
+    [
+        ((2.8, 1.1), True, True),
+        ((2.8, 1.1), False, False),
+        ((1.1, 1.0), True, False),
+        ((9.9, 9.6), True, False),
+    ],
+)
+def test_an_error_that_becomes_all_but_noise_matters(angle, repeat, matters):
+    """A slew limit by direction: noise is most of the error, and all that it leaves."""
+    judge = Said(ENOUGH, 2.0 * LEVEL, repeat=repeat, fall=0.6 * LEAST_FALL)
+    judge.angle = angle
+    assert says(judge) == matters
 
 
 def test_effort_without_another_explanation_counts_where_the_angle_hides_it():

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,6 +25,7 @@ from sysid.diagnosis.verdict.unexplained import (
     _jumps,
     _Left,
     _left,
+    _nearest,
     _remaining,
     unexplained_signs,
 )
@@ -231,3 +233,13 @@ def test_a_sentence_says_falls_only_where_something_falls():
     said = summary_of("found", [cause], [], None, (), ())
     assert "falls" not in said
     assert "falls" in summary_of("found", [cause], [], falls, (), ())
+
+
+def test_a_valley_of_free_gains_is_no_sign():
+    """What the effort's gains leave counts if the fit with free ones is further off."""
+    far, near = (SimpleNamespace(errors=np.array([0.0, x])) for x in (31.0, 1.0))
+    served = SimpleNamespace(moved=lambda model: near)
+    judge: Any = SimpleNamespace(moved=lambda model: far, serving=lambda model: served)
+    assert _nearest(judge, far) is near
+    judge = SimpleNamespace(moved=lambda model: near, serving=lambda model: judge)
+    assert _nearest(judge, far) is near
