@@ -248,11 +248,14 @@ class Judge:
         """Whether the larger model predicts angles better than the smaller one."""
         if not self.sees:
             return True
-        worse, better = self.pair(smaller, larger)
-        before = self.serving(smaller).moved(smaller)
-        gain = log_likelihood_gain(before, better, self.output.samples)
-        needed = gain > NOMINAL_THRESHOLD or self._explains(smaller, larger)
-        return needed and self.t_value(worse, better) > LEVEL
+        needed = self.shows(smaller, larger) or self._explains(smaller, larger)
+        return needed and self.t_value(*self.pair(smaller, larger)) > LEVEL
+
+    def shows(self, smaller: Model, larger: Model) -> bool:
+        """Whether the likelihood of the angle gains enough with the larger model."""
+        before, after = (self.serving(m).moved(m) for m in (smaller, larger))
+        gain = log_likelihood_gain(before, after, self.output.samples)
+        return gain > NOMINAL_THRESHOLD
 
     def _explains(self, smaller: Model, larger: Model) -> bool:
         """Whether only the larger model leaves little more than noise in the effort.

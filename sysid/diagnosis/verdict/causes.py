@@ -4,32 +4,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sysid.diagnosis.search.candidate import Model
 from sysid.diagnosis.search.coupling import EFFECT as COUPLING
-from sysid.diagnosis.search.intervals import standard_errors
-from sysid.diagnosis.search.parameters import Slot
 from sysid.diagnosis.search.search import Examined, Search
 from sysid.diagnosis.verdict.shared import combined, disagree, sharing
+from sysid.diagnosis.verdict.sizes import HALF_WIDTH, sizes_of
 from sysid.mechanism import Mechanism
 from sysid.result import Cause, Estimate
-
-HALF_WIDTH = 2.5
-"""Half the width of a 95 % interval in standard errors; measured on other hidden
-cases: models are not exact, and the normal 1.96 is too narrow."""
 
 
 def causes_of(searched: Sequence[Examined], mechanism: Mechanism) -> list[Cause]:
     """Joins the causes of all joints by effect, in order of gain."""
     by_effect: dict[str, list[Examined]] = {}
+    sizes = {e.track.joint: sizes_of(e.found) for e in searched}
     for e in searched:
         for effect in e.found.best.effects:
             by_effect.setdefault(effect, []).append(e)
     causes = []
     for effect, members in by_effect.items():
-        for where, chosen in _places(effect, members, mechanism, searched):
+        said = {j: sizes[j][effect] for j in _names(members)}
+        for where, chosen in _places(effect, members, mechanism, searched, said):
             gain = sum(evidence(e.found, effect) for e in chosen)
             other = chosen[0].track.other if effect == COUPLING else ""
-            each = [estimates(e.found, e.found.best, effect) for e in chosen]
+            each = [said[j] for j in _names(chosen)]
             several = len(chosen) > 1
             one = several and len(sharing(effect, _names(chosen), mechanism)) == 1
             size = combined(each, HALF_WIDTH) if one else _spanned(each)
@@ -51,13 +47,16 @@ def _places(
     members: Sequence[Examined],
     mechanism: Mechanism,
     searched: Sequence[Examined],
+    said: dict[str, dict[str, Estimate]],
 ) -> list[tuple[str, list[Examined]]]:
     """Returns where an effect is: the joints of one body, a class, or each joint."""
     joints, present = _names(members), set(_names(searched))
     by_name = dict(zip(joints, members, strict=True))
-    one = [[by_name[j] for j in g] for g in sharing(effect, joints, mechanism)]
+    bodies = sharing(effect, joints, mechanism)
+    one = [[by_name[j] for j in body] for body in bodies]
     each = [[e] for e in members]
-    if effect == COUPLING or (one != each and any(_apart(effect, g) for g in one)):
+    apart = any(_apart([said[j] for j in body]) for body in bodies)
+    if effect == COUPLING or (one != each and apart):
         groups = each  # each has another joint that pulls, or a size of its own
     elif one != each or len(present) == 1:
         groups = one
@@ -72,9 +71,8 @@ def _places(
     return [("all" if whole else " and ".join(_names(g)), g) for g in groups]
 
 
-def _apart(effect: str, members: Sequence[Examined]) -> bool:
+def _apart(each: Sequence[dict[str, Estimate]]) -> bool:
     """Whether joints that should feel one body disagree about it."""
-    each = [estimates(e.found, e.found.best, effect) for e in members]
     return len(each) > 1 and disagree(each, HALF_WIDTH)
 
 
@@ -90,24 +88,3 @@ def _spanned(each: Sequence[dict[str, Estimate]]) -> dict[str, Estimate]:
             one.unit,
         )
     return pooled
-
-
-def estimates(found: Search, model: Model, effect: str) -> dict[str, Estimate]:
-    """Returns the parameters of an effect with their 95 % intervals."""
-    space, theta = found.problem.space, model.fit.theta
-    sigma = standard_errors(found.problem, model, found.samples)
-    return {
-        space.slots[i].name: _interval(space.slots[i], theta[i], HALF_WIDTH * sigma[i])
-        for i in space.of(effect)
-    }
-
-
-def _interval(slot: Slot, u: float, half: float) -> Estimate:
-    """Turns an interval of the coordinate into one of the parameter."""
-    ends = [float(slot.value(np.array(x))) for x in (u - half, u + half)]
-    value = float(slot.value(np.array(u)))
-    low, high = min(ends), max(ends)
-    if slot.kind == "linear" and slot.low == 0.0:
-        low = max(low, 0.0)
-    big = 1e9
-    return Estimate(min(value, big), min(low, big), min(high, big), slot.unit)
