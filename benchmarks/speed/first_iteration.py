@@ -35,11 +35,10 @@ def main() -> None:
         turns += [("warm", first, sizes), ("cold", second, sizes[::-1])]
         starts: list[dict] = []
         for caches, folder, turn in turns:
-            starts += [
-                {"caches": caches, **_start(size, folder / size, args)} for size in turn
-            ]
-            for size, start in zip(turn, starts[-len(turn) :], strict=True):
+            for size in turn:
+                start = _start(size, folder / size, args)
                 print(f"{size}, {caches}: {start['first_s']:.1f} s", flush=True)
+                starts.append({"caches": caches, **start})
     if args.json:
         about = {k: starts[0][k] for k in ("machine", "commit", "versions")}
         kept = [{k: v for k, v in start.items() if k not in about} for start in starts]

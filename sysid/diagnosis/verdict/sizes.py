@@ -42,9 +42,10 @@ def sizes_of(found: Search) -> dict[str, dict[str, Estimate]]:
     effects = found.best.effects
     shown = [e for e in effects if shows(found, e)]
     rest = [e for e in effects if e not in shown]
-    judge = found.judge.serving(found.best)
-    by_angle = (judge.output, judge.moved(found.best)) if shown else None
-    sizes = _estimates(*by_angle, shown) if by_angle else {}
+    sizes = {}
+    if shown:
+        judge = found.judge.serving(found.best)
+        sizes |= _estimates(judge.output, judge.moved(found.best), shown)
     if rest:
         sizes |= _estimates(found.problem, found.best, rest)
     return {e: sizes[e] for e in effects}
