@@ -15,11 +15,11 @@ from fingers_mjx.reports.page import (
     picture,
     write_report,
 )
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.closed_loop import simulated
-from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Examined
+from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.verdict.wording import probable
 from sysid.result import Diagnosis
 

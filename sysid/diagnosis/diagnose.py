@@ -16,13 +16,13 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from envs.errors import InputError
+from sysid.diagnosis.fits.problem import Problem, make_problem
+from sysid.diagnosis.fits.space import make_space
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.output_error import OutputProblem
-from sysid.diagnosis.search.problem import Problem, make_problem
 from sysid.diagnosis.search.search import Examined, search
-from sysid.diagnosis.search.space import make_space
 from sysid.diagnosis.side_by_side import side_by_side
+from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.verdict.verdict import verdict_of
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism

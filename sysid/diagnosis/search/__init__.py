@@ -1,1 +1,1 @@
-"""Nested models: candidates, fits, selection, intervals."""
+"""The search for causes: stages, selection, and the judge of what counts."""

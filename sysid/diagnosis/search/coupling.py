@@ -4,9 +4,9 @@ import dataclasses
 
 import jax.numpy as jnp
 
+from sysid.diagnosis.fits.candidate import Model, fit_models
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.candidate import Model, fit_models
-from sysid.diagnosis.search.problem import Problem
 
 EFFECT = "joint_coupling"
 

@@ -28,21 +28,21 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.replay.band import EVERY, sample_rows
-from sysid.diagnosis.search.candidate import (
+from sysid.diagnosis.fits.candidate import (
     Model,
     at_nominal,
     fit_models,
     log_likelihood_gain,
 )
-from sysid.diagnosis.search.closed_loop import simulated
-from sysid.diagnosis.search.intervals import standard_errors
-from sysid.diagnosis.search.output_error import OutputProblem, output_error
-from sysid.diagnosis.search.output_starts import settled_output
-from sysid.diagnosis.search.parameters import Slot, Space
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.parameters import Slot, Space
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.space import SIGMA
+from sysid.diagnosis.replay.band import EVERY, sample_rows
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
-from sysid.diagnosis.search.space import SIGMA
+from sysid.diagnosis.simulated.closed_loop import simulated
+from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
+from sysid.diagnosis.simulated.output_starts import settled_output
 
 LEVEL = 1.0
 """Least t of a difference that counts."""

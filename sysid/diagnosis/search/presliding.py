@@ -5,8 +5,8 @@ readings show; what it gains is of the moments at which the motion reverses, whe
 models of friction differ and no one of them is true.
 """
 
-from sysid.diagnosis.search.candidate import Model
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.problem import Problem
 
 RESOLVED = 4.0
 """Presliding range from which on readings show it [standard deviations of the angle's

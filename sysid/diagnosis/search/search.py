@@ -10,21 +10,21 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.candidate import (
+from sysid.diagnosis.fits.candidate import (
     Model,
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
 )
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.likelihood.folds import shorter_blocks
+from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.coupling import coupled
-from sysid.diagnosis.search.folds import shorter_blocks
 from sysid.diagnosis.search.judge import TRIED, Judge
-from sysid.diagnosis.search.output_error import output_problem
-from sysid.diagnosis.search.output_starts import settled_output
-from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, deciding_gap, extended
+from sysid.diagnosis.simulated.output_error import output_problem
+from sysid.diagnosis.simulated.output_starts import settled_output
 
 MOST = 3
 """Largest number of causes."""

@@ -7,14 +7,14 @@ threshold and it removes enough of the error of the residual in which it acts.
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import (
+from sysid.diagnosis.fits.candidate import (
     Model,
     heldout_gain,
     log_likelihood_gain,
     off_prior,
 )
-from sysid.diagnosis.search.intervals import timing_error
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.intervals import timing_error
+from sysid.diagnosis.fits.problem import Problem
 
 LEAST_SHARE = 0.03
 """Least share of the held-out error above noise that a cause must remove."""

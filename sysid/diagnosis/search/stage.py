@@ -2,21 +2,21 @@
 
 import numpy as np
 
-from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
-from sysid.diagnosis.search.alone import costs, fitted_alone
-from sysid.diagnosis.search.candidate import (
+from sysid.diagnosis.fits.alone import costs, fitted_alone
+from sysid.diagnosis.fits.candidate import (
     Model,
     at_nominal,
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
 )
-from sysid.diagnosis.search.output_error import OutputProblem
-from sysid.diagnosis.search.output_starts import output_starts
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.starts import many_optima, starts_of
+from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
 from sysid.diagnosis.search.presliding import DRY_SHARE, is_dry, repeats_friction
-from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.selection import MODEL_ERROR
-from sysid.diagnosis.search.starts import many_optima, starts_of
+from sysid.diagnosis.simulated.output_error import OutputProblem
+from sysid.diagnosis.simulated.output_starts import output_starts
 
 REFINED = 3
 """Number of candidates whose fits are continued."""

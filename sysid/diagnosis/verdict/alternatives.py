@@ -3,7 +3,7 @@
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.search.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.candidate import Model, likelihood_gap
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD, THRESHOLD
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE

@@ -1,6 +1,6 @@
 """The evidence for every set of effects that a search fitted to one joint."""
 
-from sysid.diagnosis.search.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.candidate import Model, likelihood_gap
 from sysid.diagnosis.search.search import Search
 
 

@@ -3,11 +3,11 @@
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import Model
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.judge import within_tolerances
-from sysid.diagnosis.search.output_error import OutputProblem
-from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.result import Gain
 
 BLOCKS = 24

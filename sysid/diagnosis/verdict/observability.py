@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.search.parameters import Slot
+from sysid.diagnosis.fits.parameters import Slot
 from sysid.diagnosis.search.search import Examined, Search
 
 SEEN = 12.0

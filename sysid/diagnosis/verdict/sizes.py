@@ -10,11 +10,11 @@ large it is. Where the effort alone did, or nothing can be simulated, the equati
 
 import numpy as np
 
-from sysid.diagnosis.search.candidate import Model
-from sysid.diagnosis.search.intervals import standard_errors
-from sysid.diagnosis.search.parameters import Slot
-from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.profile import profiled, resolved
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.parameters import Slot
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.profile import profiled, resolved
 from sysid.diagnosis.search.search import Search
 from sysid.result import Estimate
 

@@ -18,13 +18,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.diagnosis.search.candidate import Model, fit_models, log_likelihood_gain
+from sysid.diagnosis.fits.candidate import Model, fit_models, log_likelihood_gain
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
-from sysid.diagnosis.search.output_error import OutputProblem
-from sysid.diagnosis.search.output_starts import settled_output
-from sysid.diagnosis.search.problem import Problem
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
+from sysid.diagnosis.simulated.output_error import OutputProblem
+from sysid.diagnosis.simulated.output_starts import settled_output
 
 OUTLIER_SD = 8.0
 """Standard deviations of the noise that no sample of it reaches."""

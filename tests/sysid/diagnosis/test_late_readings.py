@@ -12,8 +12,9 @@ from benchmarks.diagnosis.battery import run_task
 from benchmarks.diagnosis.plan import wide_plan
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.fits import space
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search import space, stage
+from sysid.diagnosis.search import stage
 from sysid.diagnosis.verdict.observability import _matters
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log

@@ -11,8 +11,8 @@ from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import drawn_case
 from benchmarks.diagnosis.hidden.conditions import Conditions
 from sysid.diagnosis.diagnose import diagnose
+from sysid.diagnosis.fits.space import SIGMA, make_space
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.space import SIGMA, make_space
 
 USUAL = 0.05
 """Tolerance of a drive.yaml without `masses`."""

@@ -11,14 +11,14 @@ import pytest
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.fits.candidate import fit_models, log_likelihood_gain
+from sysid.diagnosis.likelihood import folds
+from sysid.diagnosis.likelihood.folds import BLOCK_S, SHORTEST_S, shorter_blocks
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search import folds
-from sysid.diagnosis.search.candidate import fit_models, log_likelihood_gain
-from sysid.diagnosis.search.folds import BLOCK_S, SHORTEST_S, shorter_blocks
-from sysid.diagnosis.search.output_error import output_problem
-from sysid.diagnosis.search.output_starts import settled_output
 from sysid.diagnosis.search.search import in_parts, settled
 from sysid.diagnosis.search.selection import THRESHOLD
+from sysid.diagnosis.simulated.output_error import output_problem
+from sysid.diagnosis.simulated.output_starts import settled_output
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism

@@ -13,6 +13,7 @@ from envs.actuator.catalogue import CATALOGUE
 from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.fits.space import make_space
 from sysid.diagnosis.measured.resampling import (
     held_targets,
     read_between,
@@ -25,7 +26,6 @@ from sysid.diagnosis.replay.link import Link, LinkForce, link_step
 from sysid.diagnosis.replay.noise import spring_noise_gain
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.search import settled
-from sysid.diagnosis.search.space import make_space
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import hand_mechanism, model_mechanism

@@ -8,8 +8,8 @@ import pytest
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.fits.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.search.search import settled
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log

@@ -11,12 +11,12 @@ import pytest
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
+from sysid.diagnosis.fits.candidate import fit_models
+from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.candidate import fit_models
-from sysid.diagnosis.search.intervals import standard_errors
 from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
 from sysid.diagnosis.search.search import settled
-from sysid.diagnosis.search.space import SIGMA
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism

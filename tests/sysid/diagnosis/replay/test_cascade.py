@@ -16,7 +16,7 @@ from sysid.diagnosis.replay.cascade import (
     follow,
     with_cascade,
 )
-from sysid.diagnosis.search.closed_loop import simulated
+from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.logs.log import make_log
 
 EQUATIONS = 0.035

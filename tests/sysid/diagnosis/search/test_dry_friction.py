@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.diagnosis.search.parameters import Slot, Space
+from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.search.presliding import RESOLVED, is_dry, repeats_friction
 from sysid.diagnosis.search.stage import _simplest_first, deciding_gap
 

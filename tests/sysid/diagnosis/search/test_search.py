@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.diagnosis.search.candidate import Model, log_likelihood_gain
+from sysid.diagnosis.fits.candidate import Model, log_likelihood_gain
 from sysid.diagnosis.search.search import _confirmed, _fullest
 from sysid.diagnosis.search.selection import explained_gain
 from sysid.diagnosis.search.stage import _fits_in

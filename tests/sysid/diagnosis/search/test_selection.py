@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.search import search as searching
 from sysid.diagnosis.search import selection
-from sysid.diagnosis.search.parameters import Slot, Space
 from sysid.diagnosis.search.search import STRAINED, search
 from sysid.diagnosis.search.selection import accepted
 

@@ -8,8 +8,8 @@ import numpy as np
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import problem_of
+from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.candidate import fit_models
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.search import Search, settled
 from sysid.diagnosis.verdict.sizes import shows, sizes_of

@@ -13,14 +13,14 @@ from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.stands import make_stand
 from sysid.diagnosis.diagnose import problem_of
+from sysid.diagnosis.fits.candidate import fit_models
+from sysid.diagnosis.fits.starts import starts_of
 from sysid.diagnosis.measured.segments import grid_step_s
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search import search as search_module
-from sysid.diagnosis.search.candidate import fit_models
 from sysid.diagnosis.search.coupling import coupled, with_neighbour
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.search import Search, settled
-from sysid.diagnosis.search.starts import starts_of
 from sysid.diagnosis.verdict.unexplained import (
     _jumps,
     _Left,

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from sysid.diagnosis.search import heldout
-from sysid.diagnosis.search.heldout import held_out
+from sysid.diagnosis.fits import heldout
+from sysid.diagnosis.fits.heldout import held_out
 from sysid.least_squares import Task, fit_all
 
 FOLDS = np.repeat([0, 1], [20, 5])

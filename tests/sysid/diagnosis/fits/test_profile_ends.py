@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.diagnosis.search.candidate import Model, task_of
-from sysid.diagnosis.search.parameters import Slot, Space
-from sysid.diagnosis.search.profile import REACHES, _crossing, profiled, resolved
+from sysid.diagnosis.fits.candidate import Model, task_of
+from sysid.diagnosis.fits.parameters import Slot, Space
+from sysid.diagnosis.fits.profile import REACHES, _crossing, profiled, resolved
 from sysid.least_squares import fit_all
 
 EFFECT, LEVEL, DRAWS = "coulomb_friction", 1.96, 150

@@ -7,8 +7,8 @@ import pytest
 from support.plain_servo import problem_with
 
 from sysid.diagnosis.replay.command import command_path
-from sysid.diagnosis.search import part_targets as module
-from sysid.diagnosis.search.part_targets import part_targets
+from sysid.diagnosis.simulated import part_targets as module
+from sysid.diagnosis.simulated.part_targets import part_targets
 
 PARTS = 4
 

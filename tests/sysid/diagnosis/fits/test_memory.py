@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from sysid.diagnosis.search import memory
-from sysid.diagnosis.search.memory import remembered
+from sysid.diagnosis.fits import memory
+from sysid.diagnosis.fits.memory import remembered
 
 
 def test_only_new_candidates_are_evaluated(monkeypatch):

@@ -5,8 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sysid.diagnosis.likelihood.repeats import repeats_of
 from sysid.diagnosis.replay.band import EVERY, sample_rows
-from sysid.diagnosis.search.repeats import repeats_of
 
 DT = 0.005
 

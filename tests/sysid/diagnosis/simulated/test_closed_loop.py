@@ -8,8 +8,8 @@ import pytest
 from support.plain_servo import COULOMB, problem_with
 
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
-from sysid.diagnosis.search.closed_loop import simulated
 from sysid.diagnosis.search.judge import Judge
+from sysid.diagnosis.simulated.closed_loop import simulated
 
 
 def error(problem, changes=()):

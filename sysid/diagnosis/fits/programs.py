@@ -11,8 +11,8 @@ from collections.abc import Iterator
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.replay.effects import KINDS
-from sysid.diagnosis.search.parameters import Space
 
 COSTLY = (
     "payload_com",

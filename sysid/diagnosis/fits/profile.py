@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import Model, task_of
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.candidate import Model, task_of
+from sysid.diagnosis.fits.problem import Problem
 from sysid.least_squares import Task, fit_all
 
 MOVED = 3.0

@@ -6,10 +6,10 @@ import numpy as np
 from jaxtyping import Float
 from scipy.signal import lfilter
 
+from sysid.diagnosis.fits.candidate import Model, at_nominal, off_prior
+from sysid.diagnosis.fits.lanes import LANES
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.band import EVERY, TAPS
-from sysid.diagnosis.search.candidate import Model, at_nominal, off_prior
-from sysid.diagnosis.search.lanes import LANES
-from sysid.diagnosis.search.problem import Problem
 
 AROUND = (0.02, 0.002)
 """Logarithms around the best start within which local optima are searched."""

@@ -20,13 +20,13 @@ import math
 import numpy as np
 from jaxtyping import Float, Int
 
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.parameters import Slot
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.link import DAMPING
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
-from sysid.diagnosis.search.candidate import Model
-from sysid.diagnosis.search.parameters import Slot
-from sysid.diagnosis.search.problem import Problem
 from sysid.least_squares import block_sandwich
 
 GRID_SHARE = 1.5e-4

@@ -10,9 +10,9 @@ from functools import cache
 import numpy as np
 from jaxtyping import Bool, Float
 
+from sysid.diagnosis.likelihood.whitening import bulk_deviation
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
-from sysid.diagnosis.search.whitening import bulk_deviation
 
 
 @cache

@@ -15,15 +15,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.replay.noise import band_noise
-from sysid.diagnosis.replay.residuals import equation_error
-from sysid.diagnosis.search.folds import BLOCK_S, folds_of, stay_whole
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first
-from sysid.diagnosis.search.noise_floor import difference_noise
-from sysid.diagnosis.search.parameters import Space
-from sysid.diagnosis.search.repeats import Repeats, repeats_of
-from sysid.diagnosis.search.whitening import (
+from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
+from sysid.diagnosis.fits.parameters import Space
+from sysid.diagnosis.likelihood.folds import BLOCK_S, folds_of, stay_whole
+from sysid.diagnosis.likelihood.noise_floor import difference_noise
+from sysid.diagnosis.likelihood.repeats import Repeats, repeats_of
+from sysid.diagnosis.likelihood.whitening import (
     Noise,
     autoregressive,
     bulk_deviation,
@@ -31,6 +28,9 @@ from sysid.diagnosis.search.whitening import (
     whitened,
     with_past,
 )
+from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.replay.noise import band_noise
+from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.side_by_side import side_by_side
 from sysid.logs.log import MeasuredLog
 

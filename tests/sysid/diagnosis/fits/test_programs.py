@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
-from sysid.diagnosis.search.closed_loop import simulated
-from sysid.diagnosis.search.programs import COSTLY, programs
+from sysid.diagnosis.fits.programs import COSTLY, programs
+from sysid.diagnosis.simulated.closed_loop import simulated
 
 
 def candidates(problem, *sets):

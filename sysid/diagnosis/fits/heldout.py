@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.problem import Problem
 from sysid.least_squares import Fit, Task
 from sysid.least_squares.newton import bounded_step, normal_equations, solved
 

@@ -11,9 +11,9 @@ import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
 from envs.actuator.effect import Parameter
+from sysid.diagnosis.fits.parameters import NUISANCE, Kind, Slot, Space
 from sysid.diagnosis.replay.effects import joint_effects
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.parameters import NUISANCE, Kind, Slot, Space
 from sysid.drive import UNIVERSAL, JointDrive, Nominal
 
 SIGMA = 3.0**-0.5

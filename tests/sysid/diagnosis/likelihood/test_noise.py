@@ -11,14 +11,14 @@ from benchmarks.diagnosis.hidden.recording import standard
 from benchmarks.diagnosis.hidden.sampling import Noise
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnosis.diagnose import problem_of
+from sysid.diagnosis.likelihood.noise_floor import difference_noise
+from sysid.diagnosis.likelihood.whitening import bulk_deviation
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import Judge
-from sysid.diagnosis.search.noise_floor import difference_noise
 from sysid.diagnosis.search.search import Search, settled
-from sysid.diagnosis.search.whitening import bulk_deviation
 from sysid.diagnosis.verdict.observability import blind_effects
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log

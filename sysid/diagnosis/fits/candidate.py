@@ -13,12 +13,12 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Float
 
+from sysid.diagnosis.fits.heldout import held_out
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.likelihood.whitening import correlation_time
 from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.noise import spring_noise_gain
-from sysid.diagnosis.search.heldout import held_out
-from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.whitening import correlation_time
 from sysid.least_squares import Fit, Task, fit_all
 
 

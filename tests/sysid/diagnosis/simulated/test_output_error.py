@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
-from sysid.diagnosis.search.candidate import fit_models, likelihood_gap
-from sysid.diagnosis.search.output_error import output_problem
-from sysid.diagnosis.search.whitening import Noise
+from sysid.diagnosis.fits.candidate import fit_models, likelihood_gap
+from sysid.diagnosis.likelihood.whitening import Noise
+from sysid.diagnosis.simulated.output_error import output_problem
 
 
 def silent(late_s=0.0):

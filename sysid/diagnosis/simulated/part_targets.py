@@ -13,6 +13,8 @@ import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Array, Float
 
+from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
+from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.replay.command import (
     EFFECTS,
     Params,
@@ -20,8 +22,6 @@ from sysid.diagnosis.replay.command import (
     held_command,
 )
 from sysid.diagnosis.replay.motion import Track
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first
-from sysid.diagnosis.search.memory import Memory, remembered
 from sysid.diagnosis.side_by_side import side_by_side
 
 Values = dict[str, dict[str, Float[np.ndarray, " c"]]]

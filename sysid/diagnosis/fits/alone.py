@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.candidate import nuisance_penalty, task_of
-from sysid.diagnosis.search.problem import Problem
+from sysid.diagnosis.fits.candidate import nuisance_penalty, task_of
+from sysid.diagnosis.fits.problem import Problem
 from sysid.least_squares import fit_all
 
 Sets = Sequence[tuple[str, ...]]

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from support.plain_servo import KD, KP, problem_with
 
-from sysid.diagnosis.search.candidate import fit_models
-from sysid.diagnosis.search.output_error import output_problem
-from sysid.diagnosis.search.output_starts import (
+from sysid.diagnosis.fits.candidate import fit_models
+from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.simulated.output_error import output_problem
+from sysid.diagnosis.simulated.output_starts import (
     ALONE_TRIED,
     EQUATIONS_TRIED,
     output_starts,
     settled_output,
 )
-from sysid.diagnosis.search.search import settled
 
 
 def scales(problem, theta):

@@ -17,18 +17,18 @@ from jaxtyping import Array, Float, Int
 
 from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.joint import joint_step
+from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
+from sysid.diagnosis.fits.memory import Memory, remembered
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay import band, cascade
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
-from sysid.diagnosis.search.lanes import in_lanes, lanes_first
-from sysid.diagnosis.search.memory import Memory, remembered
-from sysid.diagnosis.search.part_targets import part_targets
-from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.programs import Program, programs
 from sysid.diagnosis.side_by_side import side_by_side
+from sysid.diagnosis.simulated.part_targets import part_targets
 
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""

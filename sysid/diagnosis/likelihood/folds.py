@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from sysid.diagnosis.likelihood.repeats import Repeats
 from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.repeats import Repeats
 from sysid.logs.log import MeasuredLog
 
 FOLDS = 3

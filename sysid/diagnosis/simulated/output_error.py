@@ -13,17 +13,17 @@ import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import maximum_filter1d
 
-from sysid.diagnosis.replay.band import sample_rows
-from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
-from sysid.diagnosis.search.closed_loop import Known, simulated
-from sysid.diagnosis.search.noise_floor import difference_noise
-from sysid.diagnosis.search.problem import Problem
-from sysid.diagnosis.search.whitening import (
+from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.likelihood.noise_floor import difference_noise
+from sysid.diagnosis.likelihood.whitening import (
     Noise,
     autoregressive,
     bulk_deviation,
     correlation_time,
 )
+from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
+from sysid.diagnosis.simulated.closed_loop import Known, simulated
 
 FAR = 1e3
 """Largest error that counts, in units of the angle's size: of unstable candidates."""

@@ -10,10 +10,10 @@ fitted alone at first.
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.search.alone import costs, fitted_alone
-from sysid.diagnosis.search.candidate import Model, at_nominal, fit_models
-from sysid.diagnosis.search.output_error import OutputProblem
-from sysid.diagnosis.search.parameters import Space
+from sysid.diagnosis.fits.alone import costs, fitted_alone
+from sysid.diagnosis.fits.candidate import Model, at_nominal, fit_models
+from sysid.diagnosis.fits.parameters import Space
+from sysid.diagnosis.simulated.output_error import OutputProblem
 
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""

@@ -1,0 +1,1 @@
+"""Fits of one set of effects: coordinates, priors, starts, candidates, intervals."""

@@ -1,0 +1,1 @@
+"""The angle that the servo's simulation predicts from targets alone, and fits to it."""
