@@ -45,8 +45,9 @@ class Calibration:
     clean: float
 
 
-CALIBRATION = Calibration(0.63, 5.32, 3.48, 0.0, -4.65)
-"""Fitted by `benchmarks.diagnosis.calibration` to 124 joints of battery seed 6007."""
+CALIBRATION = Calibration(0.82, 6.15, 4.07, 0.0, -4.65)
+"""Fitted by `benchmarks.diagnosis.calibration` to 487 joints of battery seeds 7041361
+and 2513600."""
 
 
 def posterior(
