@@ -118,6 +118,14 @@ def calibration_error(sure: np.ndarray, right: np.ndarray) -> float:
     return float(np.sum(gaps) / len(sure))
 
 
+def calibration_interval(sure: np.ndarray, right: np.ndarray) -> list[float]:
+    """The calibration error, and its 95 % interval by the bootstrap over joints."""
+    rng = np.random.default_rng(0)
+    draws = rng.integers(0, len(sure), (DRAWS, len(sure)))
+    errors = [calibration_error(sure[i], right[i]) for i in draws]
+    return [calibration_error(sure, right), *np.percentile(errors, [2.5, 97.5])]
+
+
 def main() -> None:
     """Runs from the command line."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
@@ -133,7 +141,7 @@ def main() -> None:
         print(line)
     print(f"log score {log_score(by, cases):.3f} of {len(cases)} joints")
     if args.figure:
-        _drawn(sure, right).savefig(args.figure, dpi=120)
+        drawn(sure, right).savefig(args.figure, dpi=120)
 
 
 def _read(paths: Sequence[Path]) -> list[Case]:
@@ -148,15 +156,11 @@ def _table(sure: np.ndarray, right: np.ndarray) -> list[str]:
         p, r = sure[bins == b], right[bins == b]
         span = f"{EDGES[b]:.2f}-{EDGES[b + 1]:.2f}"
         lines.append(f"{span:12}{len(p):5d}  {p.mean():.3f}  {r.mean():.3f}")
-    rng = np.random.default_rng(0)
-    draws = rng.integers(0, len(sure), (DRAWS, len(sure)))
-    errors = [calibration_error(sure[i], right[i]) for i in draws]
-    low, high = np.percentile(errors, [2.5, 97.5])
-    error = calibration_error(sure, right)
+    error, low, high = calibration_interval(sure, right)
     return [*lines, f"calibration error {error:.3f} [{low:.3f}, {high:.3f}]"]
 
 
-def _drawn(sure: np.ndarray, right: np.ndarray) -> Figure:
+def drawn(sure: np.ndarray, right: np.ndarray) -> Figure:
     """Reliability diagram with exact intervals of the bins' shares."""
     figure = Figure(figsize=(4.2, 4.2), layout="constrained")
     axis = figure.subplots()

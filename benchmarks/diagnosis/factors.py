@@ -4,7 +4,7 @@ PYTHONPATH=.:deploy python -m benchmarks.diagnosis.factors ROWS.jsonl
 """
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -20,12 +20,18 @@ def by_factor(rows: Sequence[Row]) -> str:
     lines = [
         f"{'factor':10s} {'level':9s} {'':5s}" + "".join(f"{t:>16s}" for t in HEAD)
     ]
-    for factor, levels in LEVELS.items():
-        for level in map(str, levels):
-            some = [r for r in rows if r.conditions.get(factor) == level]
-            scores = "".join(f"{text:>16s}" for text in _scores(some))
-            lines.append(f"{factor:10s} {level:9s} {len(some):5d}{scores}")
+    for factor, level, some in levels(rows):
+        text = "".join(f"{score:>16s}" for score in scores(some))
+        lines.append(f"{factor:10s} {level:9s} {len(some):5d}{text}")
     return "\n".join(lines)
+
+
+def levels(rows: Sequence[Row]) -> Iterator[tuple[str, str, list[Row]]]:
+    """Each level of each factor, with its rows."""
+    for factor, names in LEVELS.items():
+        for level in map(str, names):
+            some = [r for r in rows if r.conditions.get(factor) == level]
+            yield factor, level, some
 
 
 HEAD = (
@@ -39,7 +45,7 @@ HEAD = (
 )
 
 
-def _scores(rows: Sequence[Row]) -> list[str]:
+def scores(rows: Sequence[Row]) -> list[str]:
     """The scores of `HEAD` over some rows."""
     single = [r for r in rows if r.group == "single"]
     visible = [r for r in single if r.strength in ("medium", "strong")]

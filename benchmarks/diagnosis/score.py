@@ -156,6 +156,10 @@ def statistics(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
         result[f"first or the same, {strength}"] = _rate(r.right for r in chosen)
     visible = [r for r in single if r.verdict != "error"]
     result["in named set"] = _rate(r.effects[0] in r.named for r in single)
+    strong = [r for r in single if r.strength in ("medium", "strong")]
+    result["in named set, medium and strong"] = _rate(
+        r.effects[0] in r.named for r in strong
+    )
     sizes = [len(r.named) for r in visible if r.named]
     result["set size"] = {"mean": _mean(sizes), "n": len(sizes)}
     named = [r for r in single if r.causes]
