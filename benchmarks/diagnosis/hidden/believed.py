@@ -38,7 +38,7 @@ def _drive(joint: Joint, stand: Stand, effort: Effort) -> JointDrive:
         effort=effort,
         masses=Masses(known["mass"]),
         effects={
-            name: {key: Nominal(v, _known(known, t)) for key, (v, t) in values.items()}
+            name: {key: _nominal(v, _known(known, t)) for key, (v, t) in values.items()}
             for name, values in path.items()
             if all(math.isfinite(v) for v, _ in values.values())
         },
@@ -53,6 +53,15 @@ def _gains(joint: Joint, known: Mapping[str, float], free: bool) -> dict[str, An
     k_pos = Nominal(joint.kp / joint.kd, known["kp"], free)
     k_int = Nominal(joint.k_int, known["k_int"], free)
     return {"cascade": Cascade(k_pos, kd, k_int, joint.ref_rad_s)}
+
+
+def _nominal(value: float, tolerance: float) -> Nominal:
+    """A value and its relative tolerance: of nothing there is nothing to be wrong.
+
+    A drive's tolerance of a zero is in its own unit: as one of delay, a twentieth would
+    be 50 ms, in which any latency hides.
+    """
+    return Nominal(value, tolerance if value else 0.0)
 
 
 def _known(tolerances: Mapping[str, float], name: str) -> float:

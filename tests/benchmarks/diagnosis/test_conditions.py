@@ -13,6 +13,7 @@ from benchmarks.diagnosis.hidden.joint_drive import JointDrive
 from benchmarks.diagnosis.hidden.motions import MOTIONS, user_motion
 from benchmarks.diagnosis.hidden.stands import make_stand
 from benchmarks.diagnosis.hidden.truth import Joint
+from sysid.drive import Nominal
 
 SHORT = Conditions(round_s=4.0)
 
@@ -112,3 +113,13 @@ def test_a_cascade_is_known_by_its_own_gains_and_drawn_by_no_battery():
     assert drive.cascade.speed_limit == joint.ref_rad_s
     assert case.truth.joints[0].k_int != joint.k_int
     assert "cascade" not in LEVELS["rig"]
+
+
+def test_a_drive_without_a_delay_is_known_to_have_none():
+    """A twentieth of nothing is nothing: 50 ms would hide any latency in the drive."""
+    for lag_s, tolerance in ((0.0, 0.0), (0.008, 0.05)):
+        stand = make_stand("pendulum", np.random.default_rng(1))
+        joint = replace(stand.mechanism.joints[0], delay_s=lag_s)
+        stand = replace(stand, mechanism=stand.mechanism.with_joint(0, joint))
+        drive = believed(stand).drives["servo"]
+        assert drive.effects["transport_delay"]["delay_s"] == Nominal(lag_s, tolerance)
