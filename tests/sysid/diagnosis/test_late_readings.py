@@ -76,13 +76,27 @@ def test_from_one_small_latency_alone_it_is_not(record, monkeypatch):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("continued, found", [(6, True), (0, False)])
-def test_a_latency_that_bends_all_else_needs_a_fit_alone(monkeypatch, continued, found):
-    """As large as 3.7 times what shows: gains leave their tolerances 17 times."""
-    monkeypatch.setattr(stage, "ALONE_CONTINUED", continued)
+@pytest.mark.parametrize("tolerance_s, named", [(0.0, True), (0.05, False)])
+def test_a_latency_counts_beyond_the_tolerance_of_a_delay(
+    monkeypatch, tolerance_s, named
+):
+    """A drive without a delay is known to have none, or to have 50 ms at most.
+
+    The readings are 47 ms late. A delay as large, where it is within its tolerance,
+    leaves 98.5 µrad of the angle, and the latency 98.3: no cause is named then, though
+    the fit of the equations ends far from there and the rest is called unexplained.
+    Without such a delay it leaves 70 mrad.
+    """
+
+    def nominal(value, tolerance):
+        return Nominal(value, tolerance if value else tolerance_s)
+
+    monkeypatch.setattr("benchmarks.diagnosis.hidden.believed._nominal", nominal)
     said = run_task(wide_plan(2678377, [15])[0])
     assert said.effects == ("sensor_latency",)
-    assert (said.causes == ("sensor_latency",)) == found
+    assert said.causes == (("sensor_latency",) if named else ())
+    assert said.verdict == ("ambiguous" if named else "unexplained")
+    assert said.alternatives == (("transport_delay",) if named else ())
 
 
 def test_a_fit_from_elsewhere_does_not_take_the_place_of_a_better_one(monkeypatch):
