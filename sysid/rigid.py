@@ -24,13 +24,13 @@ class Bodies:
     """What rigid-body dynamics says along n rows, for some joints of a model (v).
 
     The torque of gravity g on a joint is m · g with the moment m = mass (a × r) of all
-    masses that it carries, and changes by m' · g with its angle.
+    masses that it carries, and changes by (a × m) · g with its angle.
 
     Attributes:
         matrix: mass matrix of the joints, with what the model gives to their drives
             [kg·m²].
         moment: m, in the frame of the mount [kg·m].
-        turned: m', mass a × (a × r); 0 for a slide [kg·m].
+        axis: a of a hinge, in that frame; 0 for a slide [1].
         push: torque of the other joints' motion on each joint [N·m].
         payload_moment, payload_shift, payload_inertia, payload_push: see `Gravity`.
         payload_kg: mass of the payload by joint.
@@ -39,7 +39,7 @@ class Bodies:
 
     matrix: Float[np.ndarray, "n v v"]
     moment: Float[np.ndarray, "n v 3"]
-    turned: Float[np.ndarray, "n v 3"]
+    axis: Float[np.ndarray, "n v 3"]
     push: Float[np.ndarray, "n v"]
     payload_moment: Float[np.ndarray, "n v 3"]
     payload_shift: Float[np.ndarray, "n v 3 3"]
@@ -60,8 +60,8 @@ class Bodies:
 
     @property
     def weight_slope(self) -> Float[np.ndarray, "n v"]:
-        """Its change with the joint's angle, m' · g [N·m/rad]."""
-        return self.turned @ self.gravity
+        """Its change with the joint's angle, (a × m) · g [N·m/rad]."""
+        return np.cross(self.axis, self.moment) @ self.gravity
 
     def gravity_on(self, j: int) -> Gravity:
         """Gravity's effect on one joint, row by row."""
@@ -152,7 +152,7 @@ def bodies_along(
     shift = np.cross(f["axis"][:, :, None], np.swapaxes(f["frame"], 2, 3))
     coarse = {
         "moment": mass * np.where(hinge, turn, f["axis"]),
-        "turned": mass * np.where(hinge, np.cross(f["axis"], turn), 0.0),
+        "axis": np.where(hinge, f["axis"], 0.0),
         "payload_moment": arm,
         "payload_shift": np.where(hinge[..., None], shift, 0.0),
         "payload_inertia": np.sum(arm**2 + hinge * spin * _shape(model, payload), -1),

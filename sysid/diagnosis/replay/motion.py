@@ -19,8 +19,8 @@ class Motion:
         push: torque of all that is neither drive nor gravity [N·m].
         ext: known push from outside, in its unit.
         inertia: of the joint with all that it carries, in this posture [kg·m²].
-        moment, turned: moment of the carried masses, and the same a quarter turn on
-            [kg·m]; see `envs.actuator.surroundings.Gravity`.
+        moment: of the carried masses [kg·m]; see `envs.actuator.surroundings.Gravity`.
+        axis: of a hinge, in the same frame; 0 for a slide [1].
         payload_moment, payload_shift, payload_inertia, payload_push: of a payload of
             1 kg; see `envs.actuator.surroundings.Gravity`.
         others_nm: sum of the other joints' |torque| [N·m].
@@ -37,7 +37,7 @@ class Motion:
     ext: Float[Array, "*t p"]
     inertia: Float[Array, "*t p"]
     moment: Float[Array, "*t p 3"]
-    turned: Float[Array, "*t p 3"]
+    axis: Float[Array, "*t p 3"]
     payload_moment: Float[Array, "*t p 3"]
     payload_shift: Float[Array, "*t p 3 3"]
     payload_inertia: Float[Array, "*t p"]

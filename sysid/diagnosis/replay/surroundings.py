@@ -1,5 +1,8 @@
 """What surrounds a joint at one step of its measured motion, for all candidates."""
 
+from functools import partial
+
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
@@ -16,8 +19,12 @@ def surroundings_at(
 ) -> tuple[Surroundings, Float[Array, "p c"]]:
     """Gravity, neighbours and load: τ_load = μ push + β ext + m(x) · g.
 
-    The moment of the carried masses turns with the joint: m(x) = μ (m cos x + m⊥ sin x)
-    for an angle x from the measured one.
+    The moment of the carried masses turns with the joint, and so do those of a payload:
+
+        m(x) = μ (m cos x + a × m sin x)
+
+    about the axis a, for an angle x from the measured one. A moment that stayed would
+    pull the simulated joint to where the measured one was.
 
     Args:
         track: gravity [m/s²] and payload [kg] of the pieces.
@@ -32,12 +39,11 @@ def surroundings_at(
     Source:
         Ours; gravity's torque m · g as in `envs.actuator.surroundings.Gravity`.
     """
-    away = away[..., None]
-    moment = jnp.cos(away) * now.moment + jnp.sin(away) * now.turned
-    moment = mass[..., None] * moment
+    turned = partial(_turned, now.axis, away[..., None])
+    moment = mass[..., None] * turned(now.moment)
     gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
     load = mass * now.push + push_gain * now.ext + jnp.sum(moment * gravity, -1)
-    payload_kg = jnp.broadcast_to(track.payload_kg[:, None], away.shape[:-1])
+    payload_kg = jnp.broadcast_to(track.payload_kg[:, None], away.shape)
     around = Surroundings(
         others_nm=now.others_nm,
         other_q=now.other_q,
@@ -46,10 +52,17 @@ def surroundings_at(
             gravity=gravity,
             moment=moment,
             payload_kg=payload_kg,
-            payload_moment=now.payload_moment,
-            payload_shift=now.payload_shift,
+            payload_moment=turned(now.payload_moment),
+            payload_shift=jax.vmap(turned, -2, -2)(now.payload_shift),
             payload_inertia=now.payload_inertia,
             payload_push=now.payload_push,
         ),
     )
     return around, load
+
+
+def _turned(
+    axis: Float[Array, "*#b 3"], angle: Float[Array, "*#b 1"], v: Float[Array, "*#b 3"]
+) -> Float[Array, "*#b 3"]:
+    """Turns vectors that are normal to an axis, v cos x + a × v sin x."""
+    return jnp.cos(angle) * v + jnp.sin(angle) * jnp.cross(axis, v)

@@ -25,7 +25,7 @@ from sysid.mechanism import Mechanism
 from sysid.rigid import Bodies, JointMotion, bodies_along, mount_gravity
 
 _RIGID = (
-    *("push", "inertia", "moment", "turned"),
+    *("push", "inertia", "moment", "axis"),
     *("payload_moment", "payload_shift", "payload_inertia", "payload_push"),
 )
 """Fields of the motion that come from the rigid bodies."""

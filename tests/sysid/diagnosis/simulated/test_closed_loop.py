@@ -126,3 +126,25 @@ def test_only_what_comes_nearer_is_confirmed(problem):
 def test_where_nothing_can_be_simulated_equations_decide(problem):
     """Unknown forces push the joint: no simulation of it says anything."""
     assert judged(replace(problem, known="controller"), 0.01, 0.02)
+
+
+def test_a_heavier_load_behind_stronger_drives_moves_as_before():
+    problem, more = problem_with(), 1.5
+    slots, theta = problem.space.slots, problem.space.nominal.copy()
+    place = {slot.label: i for i, slot in enumerate(slots)}
+
+    def put(name, value):
+        theta[place[name]] = slots[place[name]].coordinate(value)
+
+    # Far from the measured angle: the weight must be that of the simulated one.
+    put("stiffness.scale", 0.3)
+    light = theta.copy()
+    put("payload_mass.mass_kg", (more - 1.0) * 0.5)
+    put("armature.inertia_kgm2", (more - 1.0) * 0.002)
+    put("stiffness.scale", more * 0.3)
+    put("damping.scale", more)
+    put("coulomb_friction.torque_nm", more * COULOMB)
+    one, other = simulated(problem, np.stack([light, theta]))
+    measured = np.asarray(problem.data.track.pos)
+    assert np.abs(one - measured).max() > 0.2
+    np.testing.assert_allclose(one, other, atol=2e-4)
