@@ -40,7 +40,8 @@ ROTOR = 1.0
 """Tolerance of the logarithm of the motor's share of a joint's inertia."""
 
 _GRIDS = {
-    "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4),
+    # Up to a quarter of the motion: from small plays no fit reaches a large one.
+    "rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4, 1.0, 2.5),
     # Half the width of a resonance apart: ω ∝ 1 / √C.
     "rad/(N·m)": tuple(np.geomspace(0.003, 1.5, 20).tolist()),
     # A delay off by whole intervals of the targets has a kink there, which holds a fit.

@@ -29,6 +29,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.candidate import (
+    CONVERGED,
     Model,
     at_nominal,
     fit_models,
@@ -153,7 +154,7 @@ class Judge:
         if id(model) not in self.fits:
             starts = [model.fit.theta, at_nominal(output, model)]
             sets = [model.effects] * len(starts)
-            fits = fit_models(output, sets, starts, rounds=10)
+            fits = fit_models(output, sets, starts, rounds=CONVERGED)
             self.fits[id(model)] = (model, min(fits, key=lambda m: m.fit.cost))
         return self.fits[id(model)][1]
 
@@ -279,7 +280,7 @@ def within_tolerances(problem: Problem, model: Model) -> Model:
     """
     slots = [_within(s, model.effects) for s in problem.space.slots]
     bounded = replace(problem, space=Space(tuple(slots)))
-    return fit_models(bounded, [model.effects], [model.fit.theta])[0]
+    return fit_models(bounded, [model.effects], [model.fit.theta], rounds=CONVERGED)[0]
 
 
 def _within(slot: Slot, effects: tuple[str, ...]) -> Slot:

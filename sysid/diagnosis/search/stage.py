@@ -4,6 +4,7 @@ import numpy as np
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import (
+    CONVERGED,
     Model,
     at_nominal,
     fit_models,
@@ -45,7 +46,7 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     models = _best(fit_models(problem, sets, starts))
     near = models[:REFINED]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
-    models = _best([*models, *fit_models(problem, sets, starts, rounds=10)])
+    models = _best([*models, *fit_models(problem, sets, starts, rounds=CONVERGED)])
     return _simplest_first(problem, model, _ordered(problem, model, models))
 
 
@@ -134,7 +135,9 @@ def _refined(
         for m in near
         if m.penalty > OFF_PRIOR_PENALTY
     ]
-    models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=10)
+    models = fit_models(
+        problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=CONVERGED
+    )
     return _ordered(problem, smaller, _best([*models, *stage]))
 
 

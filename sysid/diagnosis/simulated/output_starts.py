@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
-from sysid.diagnosis.fits.candidate import Model, at_nominal, fit_models
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, at_nominal, fit_models
 from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
@@ -43,7 +43,9 @@ def settled_output(
     raw = output.raw(starts, weigh=False)
     nearest = raw[np.argmin(np.sum(raw**2, (1, 2, 3)))]
     problem = output.with_noise(nearest)
-    models = fit_models(problem, [effects] * len(starts), list(starts), rounds=10)
+    models = fit_models(
+        problem, [effects] * len(starts), list(starts), rounds=CONVERGED
+    )
     theta = min(models, key=lambda m: m.fit.cost).fit.theta
     problem = output.with_noise(output.raw(theta[None], weigh=False)[0])
     return problem, fit_models(problem, [effects], [theta])[0]

@@ -18,7 +18,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sysid.diagnosis.fits.candidate import Model, fit_models, log_likelihood_gain
+from sysid.diagnosis.fits.candidate import (
+    CONVERGED,
+    Model,
+    fit_models,
+    log_likelihood_gain,
+)
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
 from sysid.diagnosis.search.search import Search
@@ -78,7 +83,7 @@ def _left(found: Search) -> _Left:
             return _Left(problem, base, best, sure=True)
         # What the search took for noise may be all that is left.
         problem, best = settled_output(problem, best)
-        base = fit_models(problem, [()], [base.fit.theta], rounds=10)[0]
+        base = fit_models(problem, [()], [base.fit.theta], rounds=CONVERGED)[0]
         return _Left(problem, base, best, sure=True)
     sure = isinstance(judge.output, OutputProblem) or bool(problem.repeat)
     return _Left(judge.output, _nearest(judge, base), _nearest(judge, best), sure)
