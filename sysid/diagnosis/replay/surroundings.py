@@ -39,8 +39,8 @@ def surroundings_at(
     Source:
         Ours; gravity's torque m · g as in `envs.actuator.surroundings.Gravity`.
     """
-    turned = partial(_turned, now.axis, away[..., None])
-    moment = mass[..., None] * turned(now.moment)
+    turn = partial(turned, now.axis, away[..., None])
+    moment = mass[..., None] * turn(now.moment)
     gravity = jnp.broadcast_to(track.gravity[:, None], moment.shape)
     load = mass * now.push + push_gain * now.ext + jnp.sum(moment * gravity, -1)
     payload_kg = jnp.broadcast_to(track.payload_kg[:, None], away.shape)
@@ -52,8 +52,8 @@ def surroundings_at(
             gravity=gravity,
             moment=moment,
             payload_kg=payload_kg,
-            payload_moment=turned(now.payload_moment),
-            payload_shift=jax.vmap(turned, -2, -2)(now.payload_shift),
+            payload_moment=turn(now.payload_moment),
+            payload_shift=jax.vmap(turn, -2, -2)(now.payload_shift),
             payload_inertia=now.payload_inertia,
             payload_push=now.payload_push,
         ),
@@ -61,8 +61,21 @@ def surroundings_at(
     return around, load
 
 
-def _turned(
+def turned(
     axis: Float[Array, "*#b 3"], angle: Float[Array, "*#b 1"], v: Float[Array, "*#b 3"]
 ) -> Float[Array, "*#b 3"]:
-    """Turns vectors that are normal to an axis, v cos x + a × v sin x."""
-    return jnp.cos(angle) * v + jnp.sin(angle) * jnp.cross(axis, v)
+    """Turns vectors about a hinge to which they are normal; a slide leaves them.
+
+        v' = v cos x + a × v sin x; without an axis v' = v
+
+    Args:
+        axis: a, of unit length; 0 for a slide [1].
+        angle: x [rad].
+        v: normal to the axis.
+
+    Source:
+        Rodrigues' rotation formula.
+    """
+    hinge = jnp.sum(axis**2, -1, keepdims=True)
+    cosine = 1.0 - hinge * (1.0 - jnp.cos(angle))
+    return cosine * v + jnp.sin(angle) * jnp.cross(axis, v)

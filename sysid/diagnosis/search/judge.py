@@ -254,7 +254,10 @@ class Judge:
 
     def shows(self, smaller: Model, larger: Model) -> bool:
         """Whether the likelihood of the angle gains enough with the larger model."""
-        before, after = (self.serving(m).moved(m) for m in (smaller, larger))
+        worse, after = self.serving(smaller), self.serving(larger).moved(larger)
+        # Either fit may end in a valley of its own: the better is the smaller model.
+        fits = worse.moved(smaller), worse.nominal(smaller)
+        before = min(fits, key=lambda m: m.fit.cost)
         gain = log_likelihood_gain(before, after, self.output.samples)
         return gain > NOMINAL_THRESHOLD
 

@@ -22,7 +22,12 @@ from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.selection import accepted
-from sysid.diagnosis.search.stage import NESTED_SHARE, deciding_gap, extended
+from sysid.diagnosis.search.stage import (
+    NESTED_SHARE,
+    deciding_gap,
+    extended,
+    still_accepted,
+)
 from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import settled_output
 
@@ -135,7 +140,7 @@ def _searched(problem: Problem, base: Model) -> Search:
             break
         again = _refitted(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
-            better = [m for m in better if accepted(problem, again, m, base)]
+            better = still_accepted(problem, again, better, base)
             winner = _confirmed(judge, again, better)
             if winner is None:
                 break

@@ -15,7 +15,7 @@ from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.starts import many_optima, starts_of
 from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
 from sysid.diagnosis.search.presliding import DRY_SHARE, is_dry, repeats_friction
-from sysid.diagnosis.search.selection import MODEL_ERROR
+from sysid.diagnosis.search.selection import MODEL_ERROR, accepted
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.simulated.output_starts import output_starts
 
@@ -108,6 +108,33 @@ def _fits_in(effect: str, effects: tuple[str, ...]) -> bool:
     """Whether an effect can act with others: only one thing moves the link."""
     taken = effect in LINK_EFFECTS and any(e in LINK_EFFECTS for e in effects)
     return effect not in effects and not taken
+
+
+def still_accepted(
+    problem: Problem, smaller: Model, models: list[Model], base: Model
+) -> list[Model]:
+    """Chooses what gains over a model that was fitted again, and fits the others again.
+
+    They may be held by the kink that it has left.
+
+    Args:
+        problem: of the joint.
+        smaller: model that was fitted again.
+        models: larger ones, fitted before that.
+        base: model without an effect.
+    """
+    kept = [m for m in models if accepted(problem, smaller, m, base)]
+    lost = [m for m in models if not any(m is k for k in kept)]
+    if not lost:
+        return kept
+    starts = []
+    for model in lost:
+        own = [i for e in model.effects for i in problem.space.of(e)]
+        starts.append(smaller.fit.theta.copy())
+        starts[-1][own] = model.fit.theta[own]
+    again = fit_models(problem, [m.effects for m in lost], starts, rounds=CONVERGED)
+    kept += [m for m in again if accepted(problem, smaller, m, base)]
+    return sorted(kept, key=lambda m: m.score)
 
 
 def _refined(

@@ -15,10 +15,11 @@ ENOUGH = 2.0 * NOMINAL_THRESHOLD
 class Said(Judge):
     """A judge whose simulations gain so much, differ so clearly, and fall so far.
 
-    The angle's errors, in units of its noise, are those of `angle` before and after.
+    The angle's errors, in units of its noise, are those of `angle` before and after,
+    and `costs` those of the fits as it ends and within tolerances.
     """
 
-    angle = (1.0, 1.0)
+    angle, costs = (1.0, 1.0), (0.0, 0.0)
 
     def __init__(self, gain, t, repeat=True, effort=True, fall=2.0 * LEAST_FALL):
         data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
@@ -29,10 +30,15 @@ class Said(Judge):
         self.output = SimpleNamespace(samples=4)
 
     def moved(self, model):
-        return SimpleNamespace(**vars(model) | {"errors": np.array([self.angle[1]])})
+        return self._fitted(model, self.angle[1], self.costs[0])
 
     def nominal(self, model):
-        return SimpleNamespace(**vars(model) | {"errors": np.array([self.angle[0]])})
+        return self._fitted(model, self.angle[0], self.costs[1])
+
+    @staticmethod
+    def _fitted(model, left, cost):
+        more = {"errors": np.array([left]), "fit": SimpleNamespace(cost=cost)}
+        return SimpleNamespace(**vars(model) | more)
 
     def t_value(self, worse, better):
         return self.t
@@ -43,7 +49,10 @@ class Said(Judge):
 
 @pytest.fixture(autouse=True)
 def _gains(monkeypatch):
-    monkeypatch.setattr(module, "log_likelihood_gain", lambda *models: models[1].gain)
+    def gain(smaller, larger, _samples):
+        return smaller.fit.cost + larger.gain
+
+    monkeypatch.setattr(module, "log_likelihood_gain", gain)
 
 
 def says(judge, before=1.0, after=1.0):
@@ -59,6 +68,16 @@ def test_an_angle_that_is_predicted_better_confirms():
 
 def test_what_the_angle_does_not_need_is_no_cause():
     assert not says(Said(0.0, 2.0 * LEVEL))
+
+
+@pytest.mark.parametrize(
+    ("costs", "counts"),
+    [((ENOUGH, 0.0), False), ((0.0, ENOUGH), False), ((ENOUGH, ENOUGH), True)],
+)
+def test_a_fit_that_ended_in_a_valley_of_its_own_is_no_gain(costs, counts):
+    judge = Said(0.0, 2.0 * LEVEL)
+    judge.costs = costs
+    assert says(judge) is counts
 
 
 def test_a_difference_that_is_sure_but_small_is_no_cause():

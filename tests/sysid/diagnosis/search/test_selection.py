@@ -4,12 +4,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from support.plain_servo import problem_with
 
+from sysid.diagnosis.fits.candidate import CONVERGED, fit_models
 from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.search import search as searching
 from sysid.diagnosis.search import selection
 from sysid.diagnosis.search.search import STRAINED, search
 from sysid.diagnosis.search.selection import accepted
+from sysid.diagnosis.search.stage import still_accepted
 
 SHARE = Slot("load_friction", "drive_share", "1", "linear", 1.0, 0.0, 0.0, 0.8, 0.0,
              (), True)  # fmt: skip
@@ -113,3 +116,17 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
+
+
+def test_a_model_that_was_left_behind_is_fitted_from_where_the_smaller_one_is():
+    problem = problem_with(late_s=0.03)
+    nothing, delay, nominal = (), ("transport_delay",), problem.space.nominal
+    (smaller,) = fit_models(problem, [nothing], [nominal], rounds=CONVERGED)
+    behind = nominal.copy()
+    behind[problem.space.of("stiffness")] += 1.0
+    (stuck,) = fit_models(problem, [delay], [behind], rounds=0)
+    assert not accepted(problem, smaller, stuck, smaller)
+    (again,) = still_accepted(problem, smaller, [stuck], smaller)
+    assert again.effects == delay and accepted(problem, smaller, again, smaller)
+    assert still_accepted(problem, smaller, [again], smaller) == [again]
+    assert still_accepted(problem, again, [again], smaller) == []

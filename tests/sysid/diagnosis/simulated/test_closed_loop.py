@@ -3,11 +3,13 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from support.plain_servo import COULOMB, problem_with
 
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
+from sysid.diagnosis.replay.surroundings import turned
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.simulated.closed_loop import simulated
 
@@ -148,3 +150,11 @@ def test_a_heavier_load_behind_stronger_drives_moves_as_before():
     measured = np.asarray(problem.data.track.pos)
     assert np.abs(one - measured).max() > 0.2
     np.testing.assert_allclose(one, other, atol=2e-4)
+
+
+def test_the_weight_on_a_slide_does_not_turn():
+    """It hangs on a hinge as an arm does, and on a slide as a load."""
+    moment, away = jnp.array([0.3, 0.0, 0.0]), jnp.array([np.pi / 2.0])
+    hinge, slide = jnp.array([0.0, 0.0, 1.0]), jnp.zeros(3)
+    np.testing.assert_allclose(turned(hinge, away, moment), [0.0, 0.3, 0.0], atol=1e-6)
+    np.testing.assert_allclose(turned(slide, away, moment), moment)
