@@ -141,6 +141,8 @@ def _searched(problem: Problem, base: Model) -> Search:
         again = _refitted(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
             better = still_accepted(problem, again, better, base)
+            fresh = {m.effects: m for m in better}
+            stage = [fresh.get(m.effects, m) for m in stage]
             winner = _confirmed(judge, again, better)
             if winner is None:
                 break
