@@ -24,14 +24,20 @@ class Nominal:
 
     Attributes:
         value: of the parameter.
-        tolerance: largest relative deviation within the expected; for a value of zero
-            in its own unit.
+        tolerance: largest relative deviation within the expected, 5 % if it is not
+            given; for a value of zero in its own unit, and none if it is not given: a
+            twentieth of a second is no delay that nobody mentioned.
         free: whether nothing is known of it: a fit may choose any value.
     """
 
     value: float
-    tolerance: float = field(default=0.05, metadata=_TOLERANCE)
+    tolerance: float = field(default=math.nan, metadata=_TOLERANCE)
     free: bool = False
+
+    def __post_init__(self) -> None:
+        """Puts the tolerance of what was not given."""
+        if math.isnan(self.tolerance):
+            object.__setattr__(self, "tolerance", 0.05 if self.value else 0.0)
 
 
 @dataclass(frozen=True)

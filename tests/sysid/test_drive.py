@@ -182,3 +182,10 @@ def test_the_guide_has_every_field_of_a_joint():
     rows = re.findall(r"^\| (`[^|]+) \|", table.partition("\n\n")[0], re.MULTILINE)
     named = [name for row in rows for name in re.findall(r"`(\w+)`", row)]
     assert sorted(named) == sorted(field.name for field in fields(JointDrive))
+
+
+def test_of_nothing_no_tolerance_is_assumed():
+    """A twentieth in its own unit would be 50 ms of delay."""
+    assert Nominal(0.004).tolerance == 0.05
+    assert Nominal(0.0).tolerance == 0.0
+    assert Nominal(0.0, 0.002).tolerance == 0.002
