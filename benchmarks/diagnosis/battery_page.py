@@ -18,8 +18,8 @@ from benchmarks.diagnosis.score import Row, confusion, statistics
 from envs.config.atomic_file import write_atomic
 from sysid.diagnosis.verdict.posterior import CALIBRATION
 
-SEED, PLANNED, COMMIT = 5635306, 700, "bdb5e08"
-ROWS = Path(f"benchmarks/results/battery-wide-{SEED}-{COMMIT}.jsonl")
+SEED, PLANNED, COMMIT = 12592899, 700, "4f9d6d3"
+ROWS = Path(f"benchmarks/results/battery-wide-{SEED}.jsonl")
 PAGE = Path("docs/results/battery.md")
 FIGURE = Path("docs/images/reliability.png")
 
@@ -27,7 +27,8 @@ TEXT = """\
 # The battery
 
 {number} of {planned} records of seed {seed}, which was drawn by the machine after the
-code was fixed (commit {commit}); none of them was tuned on. Hidden effects come from
+code was fixed (commit {commit}); none of them was tuned on: the first ones, less
+those that had not ended when the machine was given back. Hidden effects come from
 another simulator (C MuJoCo at 2 kHz, effects, noise and slightly wrong nominal
 parameters of its own), and each record has conditions of its own: four rigs, drives
 with and without low-pass, with and without effort, gains known to 5 %, 50 % or not at
@@ -111,7 +112,7 @@ def _aims(rows: Sequence[Row], error: float) -> Iterator[str]:
     yield f"| calibration error ≤ 0.05 | {error:.3f} | {_met(error <= 0.05)} |"
     worst = max((_alarms(some), f"{f} {level}") for f, level, some in levels(rows))
     text = "false alarms in the worst level of a factor ≤ 5 %"
-    share = f"{100 * worst[0]:.1f} % ({worst[1]})"
+    share = f"{100 * worst[0]:.1f} %" + (f" ({worst[1]})" if worst[0] else "")
     yield f"| {text} | {share} | {_met(worst[0] <= 0.05)} |"
 
 
