@@ -13,7 +13,7 @@ def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"
     """Draws a command, c = (1 − b) k ∘ u with u ~ U(low, high) and b ~ Bernoulli(p).
 
     k is (0, 0, 1) in the share of commands that turn, (1, 1, 0) in that of those that
-    are straight and 1 in the others.
+    are straight, (0, 1, 0) in that of those to the side and 1 in the others.
 
     Args:
         key: of the draw.
@@ -39,8 +39,10 @@ def sample_command(key: PRNGKeyArray, config: CommandConfig) -> Float[Array, "3"
     stand = jax.random.bernoulli(stream(key, "standing"), config.standing_fraction)
     kind = jax.random.uniform(stream(key, "kind"))
     turns = kind < config.turning_fraction
-    straight = ~turns & (kind < config.turning_fraction + config.straight_fraction)
-    zero = stand | jnp.stack([turns, turns, straight])
+    least = config.turning_fraction + config.straight_fraction
+    straight = ~turns & (kind < least)
+    sideways = (kind >= least) & (kind < least + config.sideways_fraction)
+    zero = stand | jnp.stack([turns | sideways, turns, straight | sideways])
     return jnp.where(zero, 0.0, command)
 
 

@@ -20,6 +20,7 @@ MEMBERS = {
     "weights": (8, 6),
     "steering": (4, 2),
     "steering_walker": (2, 2),
+    "steering_sideways": (2, 2),
     "push_effort": (2, 1),
     "keyboard_creep": (6, 1),
     "diagnosis_gain": (3, 8),

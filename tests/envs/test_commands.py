@@ -62,6 +62,20 @@ def test_shares_of_commands_turn_on_the_spot_or_go_straight():
     np.testing.assert_array_equal(mixed[rest], every[rest])
 
 
+def test_a_share_of_commands_is_to_the_side_alone():
+    shares = {"standing_fraction": 0.0, "turning_fraction": 0.2}
+    before = draw(CommandConfig(**shares))
+    mixed = draw(CommandConfig(**shares, sideways_fraction=0.3))
+    sideways = (mixed[:, [0, 2]] == 0).all(axis=1)
+    # 30 % of 4,000 with five standard deviations of 29 on each side, half to the left
+    assert 1050 < sideways.sum() < 1350
+    assert 0.4 < (mixed[sideways, 1] > 0).mean() < 0.6
+    np.testing.assert_array_equal(mixed[sideways, 1], before[sideways, 1])
+    np.testing.assert_array_equal(mixed[~sideways], before[~sideways])
+
+
 def test_shares_above_one_are_refused():
     with pytest.raises(InputError, match=r"found 1\.1; valid: 1 at most"):
         CommandConfig(turning_fraction=0.6, straight_fraction=0.5)
+    with pytest.raises(InputError, match=r"sideways_fraction: found 1\.2; valid"):
+        CommandConfig(straight_fraction=0.6, sideways_fraction=0.6)

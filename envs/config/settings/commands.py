@@ -17,6 +17,7 @@ class CommandConfig:
         standing_fraction: share of commands that are zero; ours.
         turning_fraction: share without planar velocity; ours.
         straight_fraction: share without yaw rate; ours.
+        sideways_fraction: share to the left or right alone; ours.
     """
 
     vel_x_mps: tuple[float, float] = field(
@@ -39,8 +40,13 @@ class CommandConfig:
         default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
     )
 
+    sideways_fraction: float = field(
+        default=0.0, metadata={"unit": "1", "low": 0.0, "high": 1.0}
+    )
+
     def __post_init__(self) -> None:
         check_ordered(self, "vel_x_mps", "vel_y_mps", "yaw_rate_rps")
-        if (shares := self.turning_fraction + self.straight_fraction) > 1.0:
-            what = "command.turning_fraction + command.straight_fraction"
+        kinds = (self.turning_fraction, self.straight_fraction, self.sideways_fraction)
+        if (shares := sum(kinds)) > 1.0:
+            what = "command.turning_fraction + straight_fraction + sideways_fraction"
             raise InputError("configuration", what, f"{shares:g}", "1 at most")
