@@ -5,8 +5,13 @@ What a band smooths of those, and their noise, makes sizes wrong by more than an
 covariance of the residual says: errors in the variables do not average out. The error
 of the simulated angle has targets for inputs, which are known, and its estimate stays
 consistent. So the equations find an effect, and the angle that confirmed it says how
-large it is. Where the effort alone did, or nothing can be simulated, the equations do.
+large it is. Where the effort alone did, or nothing can be simulated, the equations do,
+and so they do where they leave noise and the simulation much more. Where the two
+exclude each other one of them errs by more than its likelihood knows, and the interval
+holds both.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,6 +20,7 @@ from sysid.diagnosis.fits.intervals import standard_errors
 from sysid.diagnosis.fits.parameters import Slot
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.profile import profiled, resolved
+from sysid.diagnosis.search.judge import LEFT
 from sysid.diagnosis.search.search import Search
 from sysid.result import Estimate
 
@@ -44,11 +50,47 @@ def sizes_of(found: Search) -> dict[str, dict[str, Estimate]]:
     rest = [e for e in effects if e not in shown]
     sizes = {}
     if shown:
-        judge = found.judge.serving(found.best)
-        sizes |= _estimates(judge.output, judge.moved(found.best), shown)
+        sizes |= _by_the_angle(found, shown)
     if rest:
         sizes |= _estimates(found.problem, found.best, rest)
     return {e: sizes[e] for e in effects}
+
+
+def _by_the_angle(found: Search, effects: list[str]) -> dict[str, dict[str, Estimate]]:
+    """Sizes by the simulated angle, beside those of the equations if there are any."""
+    judge = found.judge.serving(found.best)
+    model = judge.moved(found.best)
+    sizes = _estimates(judge.output, model, effects)
+    if judge.output is found.problem:
+        return sizes
+    others = _estimates(found.problem, found.best, effects)
+    if model.errors.max() > LEFT > found.best.errors.max():
+        sizes, others = others, sizes
+    return {
+        effect: {
+            name: agreed(said, others[effect][name]) for name, said in each.items()
+        }
+        for effect, each in sizes.items()
+    }
+
+
+def agreed(said: Estimate, other: Estimate) -> Estimate:
+    """An estimate whose interval holds that of another one, if it excludes that one.
+
+    Args:
+        said: by the residual that is taken.
+        other: of the same parameter by the other residual.
+
+    Source:
+        Ours.
+
+    Examples:
+        >>> agreed(Estimate(2.0, 1.9, 2.1, "1"), Estimate(2.5, 2.4, 2.6, "1")).high
+        2.6
+    """
+    if said.low <= other.value <= said.high:
+        return said
+    return replace(said, low=min(said.low, other.low), high=max(said.high, other.high))
 
 
 def shows(found: Search, effect: str) -> bool:

@@ -4,7 +4,10 @@ Nothing of the project's simulators makes them: a pendulum with dry friction beh
 servo, stepped at 10 kHz, all records side by side.
 """
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 
 from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import problem_of
@@ -12,10 +15,11 @@ from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.search import Search, settled
-from sysid.diagnosis.verdict.sizes import shows, sizes_of
+from sysid.diagnosis.verdict.sizes import agreed, shows, sizes_of
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
+from sysid.result import Estimate
 
 EFFECT, NAME = "coulomb_friction", "torque_nm"
 KP, KD, WEIGHT, INERTIA = 3.0, 0.05, 0.075, 0.01325
@@ -94,3 +98,29 @@ def test_the_angle_sizes_what_equations_find_too_small():
     assert all(inside and abs(error) < 0.03 for inside, error in angle)
     assert sum(inside for inside, _ in equations) <= 2
     assert all(error < -0.03 for _, error in equations)
+
+
+def test_a_simulation_that_does_not_fit_sizes_nothing():
+    """Its error is nine times the noise, where equations leave noise."""
+    (search,) = searches(np.array([0.03]))
+    moved, judge = search.judge.moved(search.best), search.judge
+    by_angle = sizes_of(search)[EFFECT][NAME]
+    judge.moved = lambda model: replace(moved, errors=np.array([0.0, 9.0]))
+    said = sizes_of(search)[EFFECT][NAME]
+    judge.shows = lambda smaller, larger: False
+    assert said.value == sizes_of(search)[EFFECT][NAME].value != by_angle.value
+
+
+SAID = Estimate(2.0, 1.9, 2.1, "N·m")
+
+
+@pytest.mark.parametrize(
+    ("other", "ends"),
+    [
+        (Estimate(2.05, 1.0, 3.0, "N·m"), (1.9, 2.1)),
+        (Estimate(2.5, 2.0, 3.0, "N·m"), (1.9, 3.0)),
+        (Estimate(1.0, 0.9, 1.1, "N·m"), (0.9, 2.1)),
+    ],
+)
+def test_an_interval_holds_what_it_would_exclude(other, ends):
+    assert agreed(SAID, other) == Estimate(2.0, *ends, "N·m")
