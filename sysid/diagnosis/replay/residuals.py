@@ -41,6 +41,10 @@ from sysid.diagnosis.replay.noise import residual_noise
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.replay.torque_slope import SLOPE
 
+LEAST_INERTIA = 0.01
+"""Least share of the model's inertia. Light masses and a lighter rotor may each be
+plausible, but less than nothing together: behind a spring that runs away."""
+
 
 @flax.struct.dataclass
 class Carry:
@@ -164,6 +168,7 @@ def _step(
     joint = JointInput(row.command, q, qd, load, kp, kd, around)
     states, x = chain_step(candidates.chain(row), carry.states, joint, dt)
     inertia = nuisance.mass * now.inertia + x.inertia
+    inertia = jnp.maximum(inertia, LEAST_INERTIA * now.inertia)
     gain = nuisance.effort_gain
     ramp = candidates.state_of(SLOPE.name)
     x = replace(x, follows=jnp.maximum(x.follows, states[ramp][1] if ramp else 0.0))
