@@ -20,9 +20,10 @@ SHORTEST_S = 0.1
 """Least length of those blocks [s]."""
 
 MOST_IN_FOLD = 0.8
-"""Share of the squared error that one fold may hold. A limit that one move alone meets
-is not known without that move, and what is predicted of it then is wrong however true
-the limit is; of parts of the move each is predicted from the others."""
+"""Share of the squared error beyond noise that one fold may hold. A limit that one move
+alone meets is not known without that move, and what is predicted of it then is wrong
+however true the limit is; of parts of the move each is predicted from the others. Noise
+is in all folds alike, and would hide that in a long record."""
 
 
 def folds_of(
@@ -70,18 +71,18 @@ def shorter_blocks(
     data: JointTrack,
     repeats: Repeats,
     fold: Int[np.ndarray, "m p"],
-    error: Float[np.ndarray, "m p"],
+    excess: Float[np.ndarray, "m p"],
 ) -> tuple[Int[np.ndarray, "m p"], float]:
     """Shortens blocks of time until no fold holds nearly all of an error.
 
     A record if there are several, else a second, halved while one fold holds more than
-    `MOST_IN_FOLD` of Σ e².
+    `MOST_IN_FOLD` of Σ_g max(x_g, 0) with the excess x_g = Σ_{t ∈ g} (e_t² − s²).
 
     Args:
         data: the joint's track.
         repeats: of the motion.
         fold: of `folds_of`, by record or by time.
-        error: e, of the nominal simulation.
+        excess: squared error of the nominal simulation less that of the noise [1].
 
     Returns:
         Folds [1] and the length of their blocks, at least `SHORTEST_S` [s].
@@ -90,17 +91,17 @@ def shorter_blocks(
         Ours.
     """
     length = BLOCK_S
-    if _largest_share(fold, error) > MOST_IN_FOLD:
+    if _largest_share(fold, excess) > MOST_IN_FOLD:
         fold = _in_time(data, repeats, length)
-    while length > 2.0 * SHORTEST_S and _largest_share(fold, error) > MOST_IN_FOLD:
+    while length > 2.0 * SHORTEST_S and _largest_share(fold, excess) > MOST_IN_FOLD:
         length *= 0.5
         fold = _in_time(data, repeats, length)
     return fold, length
 
 
-def _largest_share(fold: np.ndarray, error: np.ndarray) -> float:
-    """Returns the share of the squared error in the fold that has most of it."""
-    power = np.bincount(fold.ravel(), (error**2).ravel(), FOLDS)
+def _largest_share(fold: np.ndarray, excess: np.ndarray) -> float:
+    """Returns the share of the excess in the fold that has most of it."""
+    power = np.maximum(np.bincount(fold.ravel(), excess.ravel(), FOLDS), 0.0)
     return float(power.max() / max(power.sum(), 1e-300))
 
 

@@ -117,10 +117,11 @@ def search(problem: Problem) -> Search:
 
 def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
     """Holds out parts of a moment that alone has nearly all of the nominal error."""
-    if problem.whole:
+    if problem.whole or base.errors.max() < EXCESS:
         return problem, base
-    error = np.hypot(*base.fit.residual.reshape(2, *problem.fold.shape))
-    fold, block_s = shorter_blocks(problem.data, problem.repeat, problem.fold, error)
+    excess = (base.fit.residual**2 - problem.counts()).reshape(2, *problem.fold.shape)
+    blocks = problem.data, problem.repeat, problem.fold, excess.sum(0)
+    fold, block_s = shorter_blocks(*blocks)
     if np.array_equal(fold, problem.fold):
         return problem, base
     problem = replace(problem, fold=fold, block_s=block_s)

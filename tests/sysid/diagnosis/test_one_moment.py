@@ -91,14 +91,14 @@ def test_a_limit_that_one_step_meets_is_found():
     assert found.value == pytest.approx(LIMIT_NM, rel=0.05)
 
 
-def blocks(error, fold=None):
+def blocks(error, fold=None, noise=0.0):
     """Shortens blocks of a record of one piece, a sample every 10 ms."""
     data = SimpleNamespace(dt=0.01 / folds.EVERY, start_s=np.zeros(1))
     root = np.arange(len(error))[:, None]
     repeats = SimpleNamespace(root=root, root_piece=np.zeros_like(root))
     if fold is None:
         fold = (root // 100) % folds.FOLDS
-    return shorter_blocks(data, repeats, fold, error[:, None])
+    return shorter_blocks(data, repeats, fold, error[:, None] ** 2 - noise**2)
 
 
 def test_blocks_are_as_short_as_the_moment():
@@ -111,6 +111,14 @@ def test_blocks_are_as_short_as_the_moment():
     error[:] = 0.0
     error[420:423] = 10.0
     assert SHORTEST_S <= blocks(error)[1] <= 2.0 * SHORTEST_S
+
+
+def test_noise_hides_no_moment():
+    """It is in all folds: of a long record it is most of the error."""
+    error = np.random.default_rng(0).normal(size=12000)
+    error[425:475] = 5.0
+    assert blocks(error)[1] == BLOCK_S
+    assert blocks(error, noise=1.0)[1] == pytest.approx(0.5)
 
 
 def test_a_record_that_has_all_of_the_error_is_divided():
