@@ -51,10 +51,11 @@ _STEP_RANGE = (0.015, 1.0)
 _RECIPROCAL = {
     # Where no effort was logged, what a servo asks for may be ten times what it gives.
     "N·m": (1.0, 1.2, 1.6, 2.4, 4.0, 7.0, 12.0),
-    "rad/s": (0.6, 0.9, 1.2, 1.8),
     # From 0.02 to 1 s until the speed is that of the records.
     "rad/s²": tuple(np.geomspace(0.2, 10.0, 14).tolist()),
-    # A little too tight a limit is far worse than none: its optimum is narrow.
+    # A little too tight a limit is far worse than none: its optimum is narrow. One move
+    # may be thrice as fast as the others.
+    "rad/s": tuple(np.geomspace(0.3, 2.0, 20).tolist()),
     "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
 }
 

@@ -1,0 +1,17 @@
+"""From where searches begin."""
+
+import numpy as np
+import pytest
+from support.plain_servo import problem_with
+
+
+@pytest.mark.parametrize("name", ["slew_limit", "directional_slew"])
+def test_some_start_is_near_every_limit_of_speed_that_a_record_meets(name):
+    """A tenth too low a limit errs more than none: no fit comes back from there."""
+    problem = problem_with()
+    fastest = np.abs(np.asarray(problem.data.track.vel)).max()
+    usual = problem.data.speed_scale
+    for slot in (problem.space.slots[i] for i in problem.space.of(name)):
+        starts = slot.value(np.array(slot.starts))
+        for limit in np.geomspace(0.7 * usual, max(fastest, 3.0 * usual), 40):
+            assert np.abs(np.log(starts / limit)).min() < 0.06
