@@ -115,7 +115,8 @@ def still_accepted(
 ) -> list[Model]:
     """Chooses what gains over a model that was fitted again, and fits the others again.
 
-    They may be held by the kink that it has left.
+    They may be held by the kink that it has left. Best first; of those that tie, the
+    simplest.
 
     Args:
         problem: of the joint.
@@ -134,7 +135,7 @@ def still_accepted(
         starts[-1][own] = model.fit.theta[own]
     again = fit_models(problem, [m.effects for m in lost], starts, rounds=CONVERGED)
     kept += [m for m in again if accepted(problem, smaller, m, base)]
-    return sorted(kept, key=lambda m: m.score)
+    return _simplest_first(problem, smaller, _ordered(problem, smaller, kept))
 
 
 def _refined(

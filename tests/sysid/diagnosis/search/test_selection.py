@@ -1,5 +1,6 @@
 """What an effect must gain, and when a search runs again, with models written here."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,6 +11,7 @@ from sysid.diagnosis.fits.candidate import CONVERGED, fit_models
 from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.search import search as searching
 from sysid.diagnosis.search import selection
+from sysid.diagnosis.search import stage as staging
 from sysid.diagnosis.search.search import STRAINED, search
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import still_accepted
@@ -130,3 +132,21 @@ def test_a_model_that_was_left_behind_is_fitted_from_where_the_smaller_one_is():
     assert again.effects == delay and accepted(problem, smaller, again, smaller)
     assert still_accepted(problem, smaller, [again], smaller) == [again]
     assert still_accepted(problem, again, [again], smaller) == []
+
+
+def test_what_is_fitted_again_leaves_the_simplest_first(monkeypatch):
+    """A limit of each direction is by chance ahead of one of both."""
+    problem = problem_with()
+    (smaller,) = fit_models(problem, [()], [problem.space.nominal])
+    one, each, stuck = (
+        replace(smaller, effects=(effect,), score=score)
+        for effect, score in (
+            ("slew_limit", 10.5),
+            ("directional_slew", 10.0),
+            ("backlash", 20.0),
+        )
+    )
+    monkeypatch.setattr(staging, "accepted", lambda _, __, m, ___: m is not stuck)
+    monkeypatch.setattr(staging, "fit_models", lambda *_, **__: [])
+    kept = still_accepted(problem, smaller, [one, each, stuck], smaller)
+    assert kept == [one, each]
