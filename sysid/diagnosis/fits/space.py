@@ -54,8 +54,9 @@ _RECIPROCAL = {
     # From 0.02 to 1 s until the speed is that of the records.
     "rad/s²": tuple(np.geomspace(0.2, 10.0, 14).tolist()),
     # A little too tight a limit is far worse than none: its optimum is narrow. One move
-    # may be thrice as fast as the others.
-    "rad/s": tuple(np.geomspace(0.3, 2.0, 20).tolist()),
+    # may be thrice as fast as the others, and a limit that only cuts peaks is met by a
+    # few per cent of its value.
+    "rad/s": tuple(np.geomspace(0.3, 2.0, 28).tolist()),
     "N·m/s": tuple(np.geomspace(0.1, 2.0, 17).tolist()),
 }
 

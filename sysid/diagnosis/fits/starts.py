@@ -37,19 +37,41 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
         if off_prior(problem, model, name) > FAR_SD:
             result[name].append(model.fit.theta)
     fitted, nominal = model.fit.theta, at_nominal(problem, model)
-    for origin, count in ((fitted, 2), (nominal, 1)):
-        some = (
-            names if count == 2 else [n for n in names if not many_optima(problem, n)]
-        )
-        owned = [(n, t) for n in some for t in _tried(problem, model, origin, n)]
-        thetas = np.stack([origin, *(t for _, t in owned)])
-        rest, *costs = _linear_costs(problem, model, thetas)
-        idle = np.isclose(costs, rest, rtol=1e-6, atol=0.0)
-        for name in some:
-            mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
-            few = count if len(mine) > 2 else 1
-            best = sorted(mine, key=lambda k: (idle[k], costs[k]))[:few]
-            result[name] += [owned[k][1] for k in best]
+    smooth = [name for name in names if not many_optima(problem, name)]
+    for origin, some, count in ((fitted, names, 2), (nominal, smooth, 1)):
+        for name, best in best_starts(problem, model, origin, some, count).items():
+            result[name] += best
+    return result
+
+
+def best_starts(
+    problem: Problem,
+    model: Model,
+    origin: Float[np.ndarray, " n"],
+    names: Sequence[str],
+    count: int = 1,
+) -> dict[str, list]:
+    """Returns the best starts of every effect, all else as at an origin.
+
+    Args:
+        problem: residuals of a joint.
+        model: whose nuisance parameters follow linearly.
+        origin: coordinates to which an effect is added [1].
+        names: of the effects.
+        count: most starts of an effect.
+    """
+    owned = [(n, t) for n in names for t in _tried(problem, model, origin, n)]
+    if not owned:
+        return {}
+    thetas = np.stack([origin, *(t for _, t in owned)])
+    rest, *costs = _linear_costs(problem, model, thetas)
+    idle = np.isclose(costs, rest, rtol=1e-6, atol=0.0)
+    result = {}
+    for name in names:
+        mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
+        few = count if len(mine) > 2 else 1
+        best = sorted(mine, key=lambda k: (idle[k], costs[k]))[:few]
+        result[name] = [owned[k][1] for k in best]
     return result
 
 

@@ -13,6 +13,7 @@ from jaxtyping import Float
 from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import CONVERGED, Model, at_nominal, fit_models
 from sysid.diagnosis.fits.parameters import Space
+from sysid.diagnosis.fits.starts import best_starts, many_optima
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 EQUATIONS_TRIED = 3
@@ -56,28 +57,28 @@ def output_starts(
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
     """Returns where fits of the likeliest models begin: from two places each.
 
-    One is near: the effect as the equations have it, with nuisance parameters as in
-    the smaller model or as in the equations, whichever errs less. The other begins at
-    nominal, with the effect fitted alone: without an effort all torques together may
-    grow, and in that valley the near one may have gone far. Those are chosen that come
-    nearest if they are fitted alone there, those that do in the smaller model, and some
-    that the equations prefer. Where a nominal parameter of the smaller model stands for
-    an effect, as the servo's damping for viscous friction, all effects come alike near
-    there; at nominal they do not.
+    One is near: the effect fitted alone beside the smaller model, or all as in the
+    equations, whichever errs less. The other begins at nominal, with the effect fitted
+    alone: without an effort all torques together may grow, and in that valley the near
+    one may have gone far. Those are chosen that come nearest if they are fitted alone
+    there, those that do in the smaller model, and some that the equations prefer. Where
+    a nominal parameter of the smaller model stands for an effect, as the servo's
+    damping for viscous friction, all effects come alike near there; at nominal they do
+    not.
 
     Args:
         problem: the error of the angle.
         smaller: the model that lacks an effect, fitted to the angle.
         proposed: models of the equations, each with one effect more, best first.
     """
-    sets, space = [m.effects for m in proposed], problem.space
-    beside = [_beside(space, smaller, m) for m in proposed]
-    fitted = [m.fit.theta for m in proposed]
-    closer = costs(problem, sets, beside) <= costs(problem, sets, fitted)
-    near = np.where(closer[:, None], beside, fitted)
+    sets = [m.effects for m in proposed]
     begin = [at_nominal(problem, m) for m in proposed]
+    beside = _beside(problem, smaller, proposed)
     fits = fitted_alone(problem, [*sets, *sets], [*begin, *beside])
     alone, added = fits[: len(sets)], fits[len(sets) :]
+    fitted = [m.fit.theta for m in proposed]
+    closer = costs(problem, sets, added) <= costs(problem, sets, fitted)
+    near = np.where(closer[:, None], added, fitted)
     chosen = dict.fromkeys(range(min(EQUATIONS_TRIED, len(sets))))
     for thetas in (alone, added):
         ranked = np.argsort(costs(problem, sets, thetas))
@@ -85,7 +86,27 @@ def output_starts(
     return [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
 
 
-def _beside(space: Space, smaller: Model, larger: Model) -> Float[np.ndarray, " n"]:
+def _beside(
+    problem: OutputProblem, smaller: Model, proposed: list[Model]
+) -> list[Float[np.ndarray, " n"]]:
+    """Returns the smaller model with the last effect of every larger one.
+
+    Its size is that of the equations, or one of the effect's own starts if the angle is
+    nearer with it; equations may be wrong by so much that a limit is not met, or is one
+    of the other direction, and from there no slope leads back.
+    """
+    names = [m.effects[-1] for m in proposed]
+    smooth = [name for name in names if not many_optima(problem, name)]
+    own = best_starts(problem, smaller, smaller.fit.theta, smooth)
+    said = [_with_size(problem.space, smaller, m) for m in proposed]
+    tried = [own.get(name, [u])[0] for name, u in zip(names, said, strict=True)]
+    sets, rest = [m.effects for m in proposed], [smaller.fit.theta] * len(names)
+    first, second, idle = (costs(problem, sets, x) for x in (said, tried, rest))
+    still = np.isclose(first, idle, rtol=1e-6, atol=0.0)
+    return list(np.where((still | (second < first))[:, None], tried, said))
+
+
+def _with_size(space: Space, smaller: Model, larger: Model) -> np.ndarray:
     """Returns the smaller model with the larger one's last effect."""
     theta = smaller.fit.theta.copy()
     own = space.of(larger.effects[-1])

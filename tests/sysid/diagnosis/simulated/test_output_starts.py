@@ -2,12 +2,14 @@
 
 from dataclasses import replace
 
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from support.plain_servo import KD, KP, problem_with
 
 from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.simulated.closed_loop import Known, simulated
 from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import (
     ALONE_TRIED,
@@ -49,12 +51,28 @@ def test_a_candidate_begins_at_two_places(unknown):
     proposed = fit_models(problem, [("encoder_offset",)], [far], rounds=0)
     (_, near), (effects, alone) = output_starts(problem, base, proposed)
     assert effects == ("encoder_offset",)
-    # Near: the offset of the proposal, all else as in the smaller model.
-    assert near[index] == far[index]
+    # Near: the offset fitted, all else as in the smaller model.
+    assert near[index] != far[index]
     np.testing.assert_array_equal(near[others], base.fit.theta[others])
     # Alone: fitted, all else at nominal.
     assert alone[index] != far[index]
     np.testing.assert_array_equal(alone[others], problem.space.nominal[others])
+
+
+def test_a_limit_begins_in_the_direction_in_which_it_acts(unknown):
+    """Equations that propose the other direction leave no slope that leads back."""
+    problem, base = settled_output(*unknown)
+    up, down = problem.space.of("directional_slew")
+    true, said = base.fit.theta.copy(), base.fit.theta.copy()
+    true[up] = said[down] = 1.0  # the speed that two of a hundred samples exceed
+    pos = jnp.asarray(simulated(problem, true[None])[0], jnp.float32)
+    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
+    problem = replace(problem, data=data, seen=Known())
+    (base,) = fit_models(problem, [()], [base.fit.theta], rounds=0)
+    proposed = fit_models(problem, [("directional_slew",)], [said], rounds=0)
+    (_, near), _ = output_starts(problem, base, proposed)
+    assert near[up] == pytest.approx(true[up], rel=0.05)
+    assert near[down] == 0.0
 
 
 def test_what_comes_near_alone_is_tried_whatever_the_equations_say(unknown):
