@@ -97,7 +97,7 @@ def command_path(
     place = jnp.arange(len(path))[:, None] - jnp.round(steps)
     place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
     ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
-    late = [_late(x, steps) for x in (path, mean, _ripple(path, mean))]
+    late = [read_late(x, steps) for x in (path, mean, _ripple(path, mean))]
     return Commands(late[0], late[1], late[2], ahead)
 
 
@@ -177,7 +177,7 @@ def held_command(
         end = 1.0 if last else _begins(sent[:, i + 1], age)
         mean += (end - begin) * quantized(held[:, i, :, None], grid)
         begin = end
-    return _late(mean, _steps_late(params, len(held), dt))
+    return read_late(mean, _steps_late(params, len(held), dt))
 
 
 def _value(params: Params, effect: str, name: str, absent: float) -> Float[Array, " c"]:
@@ -250,7 +250,7 @@ def _chosen(condition, one, other) -> Array:
     return jnp.asarray(jnp.where(condition, one, other))
 
 
-def _late(
+def read_late(
     path: Float[Array, "t p c"], steps: Float[Array, "t c"]
 ) -> Float[Array, "t p c"]:
     """Reads a path some steps earlier: on straight lines between its samples."""

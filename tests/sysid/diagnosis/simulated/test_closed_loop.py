@@ -82,6 +82,22 @@ def test_a_push_from_outside_acts_when_it_does():
     assert error(problem) > 9e-3
 
 
+def test_late_readings_show_targets_and_pushes_alike_later():
+    """Nothing but the clock changes: what another joint pushes is read in time."""
+    problem, steps = problem_with(row_s=0.004), 4
+    track, dt = problem.data.track, problem.data.dt
+    t_s = np.arange(len(track.pos)) * dt
+    push = jnp.asarray(0.3 * np.sin(5.0 * t_s)[:, None], jnp.float32)
+    data = replace(problem.data, track=replace(track, push=push))
+    problem = replace(problem, data=data)
+    theta = np.stack([problem.space.nominal] * 2)
+    (latency,) = problem.space.of("sensor_latency")
+    theta[1, latency] = problem.space.slots[latency].coordinate(steps * dt)
+    on_time, late = simulated(problem, theta)[..., 0]
+    away = late[100 + steps :] - on_time[100:-steps]
+    assert np.abs(away[:-30]).max() < 2e-5  # a push on time would be 1e-3 off
+
+
 def model_with(error, gained=0.0):
     """A model of which an error of the angle is known, and what it gains."""
     score = 2000.0 - 2.0 * gained
