@@ -7,14 +7,14 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from benchmarks.diagnosis.calibration import (
+    all_cases,
     calibration_interval,
-    cases_of,
     drawn,
     leading,
 )
 from benchmarks.diagnosis.factors import HEAD, levels, scores
 from benchmarks.diagnosis.hidden.truth import OUTSIDE
-from benchmarks.diagnosis.score import Row, confusion, statistics
+from benchmarks.diagnosis.score import Row, confusion, read_rows, statistics
 from envs.config.atomic_file import write_atomic
 from sysid.diagnosis.verdict.posterior import CALIBRATION
 
@@ -72,8 +72,7 @@ PYTHONPATH=.:tests:deploy python -m benchmarks.diagnosis.battery_page
 
 def page(rows: Sequence[Row]) -> str:
     """Returns the page in Markdown."""
-    cases = [case for row in rows if row.verdict != "error" for case in cases_of(row)]
-    error, low, high = calibration_interval(*leading(CALIBRATION, cases))
+    error, low, high = calibration_interval(*leading(CALIBRATION, all_cases(rows)))
     return TEXT.format(
         number=len(rows),
         planned=PLANNED,
@@ -153,17 +152,11 @@ def _effects(rows: Sequence[Row]) -> Iterator[str]:
         yield f"| {'outside: ' if name in OUTSIDE else ''}{name} | {said} |"
 
 
-def read_rows(path: Path) -> list[Row]:
-    """Reads the rows of a battery."""
-    return [Row.from_json(line) for line in path.read_text("utf-8").splitlines()]
-
-
 def main() -> None:
     """Runs from the command line."""
     rows = read_rows(ROWS)
     write_atomic(PAGE, page(rows).encode())
-    cases = [case for row in rows if row.verdict != "error" for case in cases_of(row)]
-    drawn(*leading(CALIBRATION, cases)).savefig(FIGURE, dpi=120)
+    drawn(*leading(CALIBRATION, all_cases(rows))).savefig(FIGURE, dpi=120)
     print(f"{PAGE} and {FIGURE}")
 
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from scipy.optimize import minimize
 from scipy.stats import binomtest
 
-from benchmarks.diagnosis.score import Row
+from benchmarks.diagnosis.score import Row, read_rows
 from sysid.diagnosis.verdict.posterior import (
     CALIBRATION,
     Calibration,
@@ -50,6 +50,11 @@ class Case:
 def cases_of(row: Row) -> list[Case]:
     """One case for every joint that a row has evidence of."""
     return [_case(row, joint) for joint in row.evidence]
+
+
+def all_cases(rows: Sequence[Row]) -> list[Case]:
+    """The cases of all rows but those whose diagnosis raised."""
+    return [case for row in rows if row.verdict != "error" for case in cases_of(row)]
 
 
 def _case(row: Row, joint: str) -> Case:
@@ -145,8 +150,7 @@ def main() -> None:
 
 
 def _read(paths: Sequence[Path]) -> list[Case]:
-    rows = [Row.from_json(x) for p in paths for x in p.read_text().splitlines()]
-    return [c for row in rows if row.verdict != "error" for c in cases_of(row)]
+    return all_cases([row for path in paths for row in read_rows(path)])
 
 
 def _table(sure: np.ndarray, right: np.ndarray) -> list[str]:

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.diagnosis.hidden.conditions import LEVELS
-from benchmarks.diagnosis.score import Row, report
+from benchmarks.diagnosis.score import Row, read_rows, report
 
 QUIET = ("none", "not_observable")
 
@@ -72,6 +72,5 @@ def _share(hits: Sequence[bool]) -> str:
 
 
 if __name__ == "__main__":
-    text = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
-    read = [Row.from_json(line) for line in text]
+    read = read_rows(Path(sys.argv[1]))
     print(report(read), by_factor(read), sep="\n\n")

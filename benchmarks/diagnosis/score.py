@@ -132,6 +132,11 @@ class Row:
         return Row(**data)
 
 
+def read_rows(path: Path) -> list[Row]:
+    """Reads the rows of a battery."""
+    return [Row.from_json(line) for line in path.read_text("utf-8").splitlines()]
+
+
 def upper_bound(events: int, trials: int, level: float = 0.95) -> float:
     """Largest rate that so many events do not rule out (Clopper and Pearson)."""
     if events >= trials:
@@ -239,5 +244,4 @@ def report(rows: Sequence[Row]) -> str:
 
 
 if __name__ == "__main__":
-    lines = Path(sys.argv[1]).read_text(encoding="utf-8").splitlines()
-    print(report([Row.from_json(line) for line in lines]))
+    print(report(read_rows(Path(sys.argv[1]))))

@@ -137,8 +137,30 @@ def at_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
     Source:
         Ours: starts from which nuisance parameters cannot compensate each other.
     """
-    theta = problem.space.nominal.copy()
-    kept = [i for e in model.effects for i in problem.space.of(e)]
+    return with_effects(problem, problem.space.nominal, model, model.effects)
+
+
+def with_effects(
+    problem: Problem,
+    origin: Float[np.ndarray, " n"],
+    model: Model,
+    effects: Sequence[str],
+) -> Float[np.ndarray, " n"]:
+    """Coordinates of an origin, with effects of a model as that was fitted.
+
+    θ_i = θ̂_i for the parameters of the effects, else those of the origin.
+
+    Args:
+        problem: residuals of a joint.
+        origin: coordinates, in units of their scales [1].
+        model: a fitted model.
+        effects: those of the model that are put there.
+
+    Source:
+        Ours.
+    """
+    theta = origin.copy()
+    kept = [i for e in effects for i in problem.space.of(e)]
     theta[kept] = model.fit.theta[kept]
     return theta
 

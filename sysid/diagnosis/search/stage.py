@@ -10,6 +10,7 @@ from sysid.diagnosis.fits.candidate import (
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
+    with_effects,
 )
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.starts import many_optima, starts_of
@@ -128,12 +129,9 @@ def still_accepted(
     lost = [m for m in models if not any(m is k for k in kept)]
     if not lost:
         return kept
-    starts = []
-    for model in lost:
-        own = [i for e in model.effects for i in problem.space.of(e)]
-        starts.append(smaller.fit.theta.copy())
-        starts[-1][own] = model.fit.theta[own]
-    again = fit_models(problem, [m.effects for m in lost], starts, rounds=CONVERGED)
+    sets, origin = [m.effects for m in lost], smaller.fit.theta
+    starts = [with_effects(problem, origin, m, m.effects) for m in lost]
+    again = fit_models(problem, sets, starts, rounds=CONVERGED)
     kept += [m for m in again if accepted(problem, smaller, m, base)]
     return _simplest_first(problem, smaller, _ordered(problem, smaller, kept))
 

@@ -11,8 +11,13 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
-from sysid.diagnosis.fits.candidate import CONVERGED, Model, at_nominal, fit_models
-from sysid.diagnosis.fits.parameters import Space
+from sysid.diagnosis.fits.candidate import (
+    CONVERGED,
+    Model,
+    at_nominal,
+    fit_models,
+    with_effects,
+)
 from sysid.diagnosis.fits.starts import best_starts, many_optima
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
@@ -95,20 +100,12 @@ def _beside(
     nearer with it; equations may be wrong by so much that a limit is not met, or is one
     of the other direction, and from there no slope leads back.
     """
-    names = [m.effects[-1] for m in proposed]
+    names, origin = [m.effects[-1] for m in proposed], smaller.fit.theta
     smooth = [name for name in names if not many_optima(problem, name)]
-    own = best_starts(problem, smaller, smaller.fit.theta, smooth)
-    said = [_with_size(problem.space, smaller, m) for m in proposed]
+    own = best_starts(problem, smaller, origin, smooth)
+    said = [with_effects(problem, origin, m, m.effects[-1:]) for m in proposed]
     tried = [own.get(name, [u])[0] for name, u in zip(names, said, strict=True)]
-    sets, rest = [m.effects for m in proposed], [smaller.fit.theta] * len(names)
+    sets, rest = [m.effects for m in proposed], [origin] * len(names)
     first, second, idle = (costs(problem, sets, x) for x in (said, tried, rest))
     still = np.isclose(first, idle, rtol=1e-6, atol=0.0)
     return list(np.where((still | (second < first))[:, None], tried, said))
-
-
-def _with_size(space: Space, smaller: Model, larger: Model) -> np.ndarray:
-    """Returns the smaller model with the larger one's last effect."""
-    theta = smaller.fit.theta.copy()
-    own = space.of(larger.effects[-1])
-    theta[own] = larger.fit.theta[own]
-    return theta

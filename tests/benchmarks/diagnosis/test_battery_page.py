@@ -4,8 +4,8 @@ import dataclasses
 
 import pytest
 
-from benchmarks.diagnosis.battery_page import PAGE, ROWS, page, read_rows
-from benchmarks.diagnosis.score import Row
+from benchmarks.diagnosis.battery_page import PAGE, ROWS, page
+from benchmarks.diagnosis.score import Row, read_rows
 
 PENDULUM = {"rig": "pendulum", "effort": "True"}
 RIGHT = Row(
