@@ -34,7 +34,7 @@ from benchmarks.diagnosis.plan import (
     redrawn,
     wide_plan,
 )
-from benchmarks.diagnosis.score import Row, confusion, report, statistics
+from benchmarks.diagnosis.score import Row, confusion, read_rows, report, statistics
 from fingers_mjx.studies.sweep.engines.held import CORES, Held, cores
 
 RECORDS_OF_A_PROCESS = 12
@@ -231,8 +231,8 @@ def run_all(tasks: list[Task], workers: int, out: Path, name: str) -> list[Row]:
     """
     out.mkdir(parents=True, exist_ok=True)
     file = out / name
-    lines = file.read_text().splitlines() if file.exists() else []
-    done = {row.seed: row for row in map(Row.from_json, lines)}
+    read = read_rows(file) if file.exists() else []
+    done = {row.seed: row for row in read}
     missing = [task for task in tasks if task.seed not in done]
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     numbers = {task.seed: task.number for task in missing}
