@@ -51,8 +51,15 @@ def machine_bytes() -> int:
     return min(total, int(text)) if text.isdigit() else total
 
 
-def check_memory(config: TrainConfig, learners: int = 1) -> None:
+def check_memory(
+    config: TrainConfig, learners: int = 1, source: str = "settings"
+) -> None:
     """Refuses a run that needs more memory than there is.
+
+    Args:
+        config: its settings.
+        learners: learners of a population.
+        source: where the settings are from, which the error names.
 
     Raises:
         InputError: with the number.
@@ -63,7 +70,7 @@ def check_memory(config: TrainConfig, learners: int = 1) -> None:
         valid = (
             f"{_gigabytes(there)} here: fewer worlds, shorter unrolls, smaller layers"
         )
-        raise InputError("settings", "num_envs, ppo", found, valid)
+        raise InputError(source, "num_envs, ppo", found, valid)
 
 
 def _parameters(sizes: Sequence[int]) -> int:

@@ -17,6 +17,7 @@ from fingers_mjx.studies.sweep.plan import (
     trainings,
 )
 from fingers_mjx.studies.sweep.spec import Stage, Sweep, seed_list
+from fingers_mjx.training.memory import check_memory
 
 LAYERS = ("actor_layers", "critic_layers")
 """Shapes of the networks, which a stage takes over from the one before."""
@@ -41,10 +42,9 @@ def check_words(spec: Sweep, source: Path, backend: str) -> None:
         raise InputError(source, "task", error.found, error.valid) from error
     _check_one(source, "preset", spec.preset, PRESETS)
     backends = {"backend": backend, "evaluate.backend": spec.evaluate.backend}
-    here = not (spec.engine == "ray" and spec.address)
     for field, name in backends.items():
         _check_one(source, field, name, BACKENDS)
-        if name == "warp" and here and find_spec("warp") is None:
+        if name == "warp" and _trains_here(spec) and find_spec("warp") is None:
             valid = "what is installed: cpu or jax; warp needs the extra cuda12 or 13"
             raise InputError(source, field, name, valid)
 
@@ -62,11 +62,19 @@ def check_sweep(spec: Sweep, root: Path, source: Path) -> None:
         for configuration in spec.configurations:
             stages = trainings(spec, root, Key(configuration, seed))
             _check_shapes(spec.stages, stages)
+            if _trains_here(spec):
+                for stage in stages:
+                    check_memory(stage.setup.train, source=SETTINGS)
             overridden_at(stages[-1].setup, {"evaluate.set": spec.evaluate.set})
     except InputError as error:
         if error.source != SETTINGS:
             raise
         raise InputError(source, error.field, error.found, error.valid) from error
+
+
+def _trains_here(spec: Sweep) -> bool:
+    """Whether members are trained on this machine, and not on those of a cluster."""
+    return not (spec.engine == "ray" and spec.address)
 
 
 def _check_one(

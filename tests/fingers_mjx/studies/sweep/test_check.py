@@ -7,6 +7,7 @@ from envs.errors import InputError
 from fingers_mjx.evaluation.direction import BETTER
 from fingers_mjx.studies.sweep import check
 from fingers_mjx.studies.sweep.resolve import SPEC_FILE, keep_sweep
+from fingers_mjx.training import memory
 
 SPACE = {"ppo.clip": {"low": 0.1, "high": 0.3}}
 HAND = "text: the name of a hand file, or null"
@@ -121,3 +122,11 @@ def test_a_task_without_a_main_measure_lists_the_known_ones(tmp_path, monkeypatc
     error = refused(tmp_path, promote={"top": 3, "seeds": 6})
     assert (error.field, error.found) == ("promote.by", "")
     assert "one of survival, undesired_contact_rate" in error.valid
+
+
+def test_a_member_that_no_memory_here_can_hold_is_refused(tmp_path, monkeypatch):
+    monkeypatch.setattr(memory, "machine_bytes", lambda: 10**9)
+    large = {"configurations": {"small": {}, "large": {"num_envs": 2**20}}}
+    error = refused(tmp_path, **large)
+    assert "GB of memory needed" in error.found and "1.0 GB here" in error.valid
+    kept(tmp_path, **large, engine="ray", address="ray://127.0.0.1:10001")
