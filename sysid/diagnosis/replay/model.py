@@ -11,6 +11,7 @@ from jaxtyping import Array, Float
 from envs.actuator.effect import EffectKind, Params, Substep
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import EVERY
+from sysid.diagnosis.replay.beside import ages
 from sysid.diagnosis.replay.cascade import with_cascade
 from sysid.diagnosis.replay.command import Commands
 from sysid.diagnosis.replay.effects import ENTER, READ, RIGID, SLOW
@@ -50,6 +51,7 @@ class Row:
 
     Attributes:
         motion: of the joint.
+        number: of the step, from 0.
         snap: fourth derivative of its angle [rad/s⁴].
         within: how far angle, speed and acceleration still go at the times
             `command.WITHIN` until the end of the step.
@@ -59,6 +61,7 @@ class Row:
     """
 
     motion: Motion
+    number: Float[Array, "*t"]
     snap: Float[Array, "*t p"]
     within: tuple[Float[Array, "*t k p"], ...]
     command: Float[Array, "*t p c"]
@@ -76,6 +79,7 @@ class Candidates:
         nuisance: the other parameters.
         gap_rad, compliance: of the link.
         spring_gain: noise gain of the spring [1].
+        age: of the readings; see `beside.ages`.
         dt: step of the grid [s].
     """
 
@@ -85,6 +89,7 @@ class Candidates:
     gap_rad: Float[Array, "1 c"]
     compliance: Float[Array, "1 c"]
     spring_gain: Float[Array, "p c"]
+    age: Float[Array, "2 c"]
     dt: float
 
     @property
@@ -205,7 +210,8 @@ def make_candidates(
     noise = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
     gain = spring_noise_gain(whole - inner, inner, compliance, *noise)
     nuisance = replace(nuisance, rotor=rotor)
-    return Candidates(track, wide, nuisance, gap, compliance, gain, dt)
+    age = ages(params, dt)
+    return Candidates(track, wide, nuisance, gap, compliance, gain, age, dt)
 
 
 def _link_of(params, rotor):
@@ -243,7 +249,9 @@ def rows_of(track: Track, commands: Commands, dt: float) -> Row:
     )
     snap = jnp.asarray(jnp.gradient(track.jerk, dt, axis=0))
     ripple = track.between * commands.ripple
-    return Row(motion_of(track), snap, within, commands.path, ripple, commands.ahead)
+    number = jnp.arange(len(snap), dtype=snap.dtype)
+    targets = commands.path, ripple, commands.ahead
+    return Row(motion_of(track), number, snap, within, *targets)
 
 
 def at_step(row: Row) -> Row:

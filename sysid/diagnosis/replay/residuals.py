@@ -27,6 +27,7 @@ from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import Substep
 from sysid.diagnosis.replay import cascade, link
 from sysid.diagnosis.replay.band import band, smooth
+from sysid.diagnosis.replay.beside import beside
 from sysid.diagnosis.replay.command import command_path
 from sysid.diagnosis.replay.model import (
     Candidates,
@@ -36,7 +37,7 @@ from sysid.diagnosis.replay.model import (
     make_candidates,
     rows_of,
 )
-from sysid.diagnosis.replay.motion import Track
+from sysid.diagnosis.replay.motion import Track, motion_of
 from sysid.diagnosis.replay.noise import residual_noise
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.replay.torque_slope import SLOPE
@@ -156,14 +157,14 @@ def _step(
 ) -> tuple[Carry, Torques]:
     """Evaluates the chain at one step: servo, transmission, friction, noise."""
     row, nuisance, track = at_step(row), candidates.nuisance, candidates.track
-    now, dt = row.motion, candidates.dt
+    dt, number = candidates.dt, row.number[None]
+    now, turned = beside(motion_of(track), row.motion, number, candidates.age)
     angle, rate = candidates.reading(now)
     # The angle at which the encoder would read this: a step of Newton's method.
     q = carry.q + (angle - carry.encoder) / carry.slope
     qd = rate / carry.slope
-    around, load = surroundings_at(
-        track, now, q - angle + carry.link[0], nuisance.mass, nuisance.push_gain
-    )
+    away = q - angle + carry.link[0] + turned
+    around, load = surroundings_at(track, now, away, nuisance.mass, nuisance.push_gain)
     kp, kd = track.kp[:, None], track.kd[:, None]
     joint = JointInput(row.command, q, qd, load, kp, kd, around)
     states, x = chain_step(candidates.chain(row), carry.states, joint, dt)

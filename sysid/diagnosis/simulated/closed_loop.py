@@ -23,7 +23,7 @@ from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay import band, cascade
-from sysid.diagnosis.replay.command import read_late
+from sysid.diagnosis.replay.beside import ages, beside
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
@@ -98,8 +98,7 @@ def simulated(
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
         params, nuisance = problem.space.values(thetas[lanes])
         acting = {name: params[name] for name in program}
-        late_s = params.get("sensor_latency", {"latency_s": 0.0 * nuisance.mass})
-        moved = (targets[lanes], late_s["latency_s"] / dt)
+        moved = (targets[lanes], ages(params, dt))
         out = _simulated(track, moved, acting, nuisance, program, *fixed)
         return lanes_first(out, count)[:, rows]
 
@@ -133,22 +132,27 @@ def _parts(whole_s: float, most_s: float) -> int:
 class _Windows:
     """The motion at the end and start of steps, in windows side by side, and targets.
 
-    Those are the mean targets of the substeps; pushes are at start and end. Where the
-    record resumes, the joint is where it was measured.
+    Those are the mean targets of the substeps. Where the record resumes, the joint is
+    where it was measured.
+
+    Attributes:
+        number: of the steps, in every window.
+        whole: the motion before it is cut.
     """
 
     motion: Motion
     before: Motion
     target: Float[Array, "w k l c"]
     resumed: Float[Array, "w l"]
-    pushes: tuple[Float[Array, "w l c"], Float[Array, "w l c"]]
+    number: Float[Array, "w n"]
+    whole: Motion
     track: Track
 
 
 @partial(jax.jit, static_argnums=(4, 5, 6, 7, 8))
 def _simulated(
     track: Track,
-    moved: tuple[Float[Array, "c t k p"], Float[Array, " c"]],
+    moved: tuple[Float[Array, "c t k p"], Float[Array, "2 c"]],
     params: dict[str, dict[str, Float[Array, " c"]]],
     nuisance: Nuisance,
     program: Program,
@@ -158,14 +162,14 @@ def _simulated(
     driven: bool,
 ) -> Float[Array, "t p c"]:
     """Integrates all candidates side by side, on targets and ages of readings."""
-    targets, late = moved
+    targets, age = moved
     effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in program}
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
     pushed = nuisance.push_gain[None, :]
     count = gain.shape[1]
     steps, pieces = track.pos.shape
     each = substeps // targets.shape[2]
-    cut = _cut(track, jnp.moveaxis(targets, 0, -1), late, window, dt * substeps)
+    cut = _cut(track, jnp.moveaxis(targets, 0, -1), window, dt * substeps)
     effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
     model = [(KINDS[n], p) for n, p in effects.items()]
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
@@ -174,12 +178,13 @@ def _simulated(
     def chain(now):
         return (*model, (ENTER, {**enters, "effort": gain * now.effort}))
 
-    def substep(carry, now, target):
-        states, q, qd, _ = carry
+    def substep(carry, there, target):
+        (states, q, qd, _), (now, turned) = carry, there
         # Angles at the middle of a substep, where its mean target is, and speeds at its
         # ends, with the damping of their mean: right to second order in the substep.
         middle = q + 0.5 * dt * qd
-        around, load = surroundings_at(cut.track, now, middle - now.pos, mass, pushed)
+        away = middle - now.pos + turned
+        around, load = surroundings_at(cut.track, now, away, mass, pushed)
         joint = JointInput(target, middle, qd, load, kp, kd, around)
         states, x = chain_step(chain(now), states, joint, dt)
         x = replace(x, damping=0.5 * x.damping * (1.0 - float(driven)))
@@ -190,11 +195,13 @@ def _simulated(
 
     def step(carry, row):
         before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]
-        before, after = replace(before, push=row[4]), replace(after, push=row[5])
+        before = beside(cut.whole, before, row[4] - 1.0, age)
+        after = beside(cut.whole, after, row[4], age)
         states, q, qd, y = carry
         anew = row[3][:, None] > 0.0
-        q, qd = jnp.where(anew, before.pos, q), jnp.where(anew, before.vel, qd)
-        states = _begun(cut.track, before, nuisance, effects, states, anew)
+        then = before[0]
+        q, qd = jnp.where(anew, then.pos, q), jnp.where(anew, then.vel, qd)
+        states = _begun(cut.track, then, nuisance, effects, states, anew)
 
         def within(i, c):
             share = (i + 0.5) / substeps
@@ -208,7 +215,7 @@ def _simulated(
     q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
     states = init_states(chain(first), cut.target[0, 0], q0, dt)
     start = (states, q0, qd0, q0)
-    rows = (cut.before, cut.motion, cut.target, cut.resumed, *cut.pushes)
+    rows = (cut.before, cut.motion, cut.target, cut.resumed, cut.number)
     angles = jax.lax.scan(step, start, rows)[1]
     whole = angles.reshape(window, -1, pieces, count)
     return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
@@ -232,15 +239,10 @@ def _begun(track: Track, now: Motion, nuisance: Nuisance, effects, states, anew)
 def _cut(
     track: Track,
     target: Float[Array, "t k p c"],
-    late: Float[Array, " c"],
     window: int,
     dt: float,
 ) -> _Windows:
-    """Cuts all along time into windows and lays them side by side.
-
-    Of readings that are late (in steps) other joints pushed that much earlier, as the
-    targets were sent earlier: the simulation runs on the clock of the readings.
-    """
+    """Cuts all along time into windows and lays them side by side."""
     steps = len(track.pos)
     number = -(-steps // window)
     tail = number * window - steps
@@ -251,21 +253,19 @@ def _cut(
         return jnp.swapaxes(parts, 0, 1).reshape(window, -1, *x.shape[2:])
 
     moved = jnp.swapaxes(target, 1, 2)
-    beside = jnp.swapaxes(cut(moved), 1, 2)
+    aside = jnp.swapaxes(cut(moved), 1, 2)
     constants = {
         name: jnp.concatenate([getattr(track, name)] * number)
         for name in ("gravity", "payload_kg", "kp", "kd")
     }
     motion = motion_of(track)
     motion = replace(motion, push=_unsmoothed(motion.push))
-    pushed = jnp.broadcast_to(motion.push[..., None], (*motion.push.shape, late.size))
-    push = read_late(pushed, jnp.broadcast_to(late, (steps, late.size)))
-    pushes = cut(jnp.concatenate([push[:1], push[:-1]])), cut(push)
     before = jax.tree.map(cut, _before(motion, dt))
+    starts = jnp.arange(number) * window
+    count = (jnp.arange(window)[:, None] + starts).astype(track.pos.dtype)
     track = replace(track, **constants)
-    return _Windows(
-        jax.tree.map(cut, motion), before, beside, cut(track.resumed), pushes, track
-    )
+    rows = jax.tree.map(cut, motion), before, aside, cut(track.resumed), count
+    return _Windows(*rows, motion, track)
 
 
 def _unsmoothed(x: Float[Array, "t p"]) -> Float[Array, "t p"]:
