@@ -41,15 +41,23 @@ def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0001):
 
 
 def problem_with(
-    late_s=0.0, known="both", row_s=0.02, push=still, lost_s=(0.0, 0.0), believed=None
+    late_s=0.0,
+    known="both",
+    row_s=0.02,
+    push=still,
+    lost_s=(0.0, 0.0),
+    believed=None,
+    shown=1.0,
 ):
     """The equations of one record of it; between two times rows are lost.
 
-    `believed` are gains of which nothing is known.
+    `believed` are gains of which nothing is known, `shown` is the share of a target
+    that the torque in its row has.
     """
     t_s = np.arange(0.0, 8.0, row_s)
     cmd = 1.2 * np.sin(2.0 * t_s) * np.cos(0.5 * t_s) + 0.3 * np.sin(7.0 * t_s)
     angle, torque = servo(cmd, row_s, late_s, push)
+    torque -= (1.0 - shown) * KP * np.diff(cmd, prepend=0.0)
     columns = {"cmd.servo": cmd, "pos.servo": angle, "tau.servo": torque}
     kept = (t_s <= lost_s[0]) | (t_s >= lost_s[1])
     log = make_log(

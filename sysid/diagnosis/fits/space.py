@@ -34,7 +34,7 @@ ZERO_RAD = 1e-3
 
 SAMPLED = 1.0
 """Tolerance of the share of a ripple that an effort lacks which jumps with its targets:
-drives report it at one moment, or as a mean."""
+drives report it at one moment, before their target or behind it, or as a mean."""
 
 ROTOR = 1.0
 """Tolerance of the logarithm of the motor's share of a joint's inertia."""
@@ -97,7 +97,7 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
     plain = not drive.effects.get("lowpass_cutoff")
     if plain and track.effort.any():
         sampled = _nuisance("ripple", "1", "linear", 1.0, SAMPLED)
-        slots.append(replace(sampled, nominal=1.0, low=0.0, high=1.0))
+        slots.append(replace(sampled, low=-1.0, high=1.0))
     if drive.cascade is not None and drive.cascade.k_int.value:
         k_int = drive.cascade.k_int
         tolerance = math.inf if k_int.free else k_int.tolerance

@@ -32,7 +32,8 @@ class Nuisance:
         hold_s: mean age at which a torque acts [s].
         rotor: inertia on the motor's side of a play [kg·m²].
         ripple: share of the command's ripple that the logged effort lacks: 1 if it is
-            the torque at one moment, 0 if it is the mean of a row [1].
+            the torque just before the target of its row, −1 just behind it, 0 if it is
+            the mean of a row [1].
     """
 
     effort_gain: Float[Array, "*b c"]

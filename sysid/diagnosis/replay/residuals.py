@@ -187,8 +187,11 @@ def _step(
     unit = gain * candidates.spring_gain * noise.mechanics / nominal.mechanics
     servo, (sharp_angle, sharp_rate) = states[-1], candidates.sharp_reading(now)
     enters = (1.0 - track.measured[:, None]) / unit
+    # What the logged effort has of the ripple the mechanics does not add.
+    shown = track.measured[:, None] * (1.0 - nuisance.ripple) * row.ripple
+    command = servo + x.kp * (sharp_angle + x.follows * shown) + x.kd * sharp_rate
     torques = Torques(
-        command=(servo + x.kp * sharp_angle + x.kd * sharp_rate) / gain,
+        command=command / gain,
         answer=(x.kp * angle + x.kd * rate) / gain,
         controller_gain=noise.controller / nominal.controller,
         needed=needed / unit - enters * servo,

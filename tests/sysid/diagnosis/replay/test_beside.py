@@ -19,12 +19,8 @@ def with_track(problem, **fields):
 
 
 def late_by(problem, steps):
-    """Coordinates of a joint whose readings are late by some steps of the grid.
-
-    Its effort is a mean, without what targets do between rows.
-    """
+    """Coordinates of a joint whose readings are late by some steps of the grid."""
     theta = problem.space.nominal.copy()
-    theta[[slot.label == "ripple" for slot in problem.space.slots]] = 0.0
     (latency,) = problem.space.of("sensor_latency")
     slot = problem.space.slots[latency]
     theta[latency] = slot.coordinate(steps * problem.data.dt)
