@@ -19,7 +19,7 @@ from benchmarks.diagnosis.hidden.cases import draw_case
 from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.fits.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.search.stage import extended
 
 

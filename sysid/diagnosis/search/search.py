@@ -19,9 +19,11 @@ from sysid.diagnosis.fits.candidate import (
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.likelihood.folds import shorter_blocks
 from sysid.diagnosis.replay.motion import JointTrack
+from sysid.diagnosis.search.by_angle import leaves_much, unsolved
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.selection import accepted
+from sysid.diagnosis.search.settling import refitted, settled
 from sysid.diagnosis.search.stage import (
     NESTED_SHARE,
     deciding_gap,
@@ -106,13 +108,23 @@ def search(problem: Problem) -> Search:
     if output is not None:
         problem, base = settled_output(output, base)
     problem, base = in_parts(problem, base)
-    found = _searched(problem, base)
+    found = _by_angle(_searched(problem, base))
     strained = base.penalty > STRAINED
     if problem.repeat or not (found.best.effects or strained):
         return found
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
     return _searched(problem, base)
+
+
+def _by_angle(found: Search) -> Search:
+    """Searches the angle itself where the answer of the equations leaves much of it."""
+    start = unsolved(found.judge, found.base, found.best, found.rejected)
+    if start is None:
+        return found
+    again = _searched(*start)
+    left = again.base.errors[1], again.best.errors[1]
+    return found if leaves_much(*left) else again
 
 
 def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
@@ -139,7 +151,7 @@ def _searched(problem: Problem, base: Model) -> Search:
         winner = _confirmed(judge, best, better)
         if winner is None:
             break
-        again = _refitted(problem, best.effects, winner.fit.theta)
+        again = refitted(problem, best.effects, winner.fit.theta)
         if again.fit.cost < best.fit.cost:
             better = still_accepted(problem, again, better, base)
             fresh = {m.effects: m for m in better}
@@ -193,32 +205,6 @@ def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | Non
             return model
         nearer = nearer or model
     return nearer
-
-
-def settled(problem: Problem) -> tuple[Problem, Model]:
-    """Fits the nuisance parameters and estimates the noise, in turns."""
-    theta = problem.space.nominal
-    for _ in range(3):
-        problem = problem.with_noise(problem.raw(theta[None], weigh=False)[0])
-        model = _refitted(problem, (), theta)
-        theta = model.fit.theta
-    return problem, model
-
-
-def _refitted(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> Model:
-    """Fits from where a fit is, and from other delays; returns the best.
-
-    Where targets arrive just when readings are taken, the error has a kink, at which a
-    fit would stay.
-    """
-    slots, starts = problem.space.slots, [theta]
-    for i in problem.space.of("transport_delay"):
-        for way in (-1.0, 1.0) if 0.0 < slots[i].prior_sd < np.inf else ():
-            moved = theta.copy()
-            moved[i] = max(moved[i] + way * slots[i].prior_sd, slots[i].low)
-            starts.append(moved)
-    models = fit_models(problem, [effects] * len(starts), starts)
-    return min(models, key=lambda m: m.fit.cost)
 
 
 def pruned(problem: Problem, model: Model, base: Model) -> Model:

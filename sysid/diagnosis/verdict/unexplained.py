@@ -25,7 +25,7 @@ from sysid.diagnosis.fits.candidate import (
     log_likelihood_gain,
 )
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
+from sysid.diagnosis.search.by_angle import leaves_much, nearest
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
 from sysid.diagnosis.simulated.output_error import OutputProblem
@@ -86,16 +86,7 @@ def _left(found: Search) -> _Left:
         base = fit_models(problem, [()], [base.fit.theta], rounds=CONVERGED)[0]
         return _Left(problem, base, best, sure=True)
     sure = isinstance(judge.output, OutputProblem) or bool(problem.repeat)
-    return _Left(judge.output, _nearest(judge, base), _nearest(judge, best), sure)
-
-
-def _nearest(judge: Judge, model: Model) -> Model:
-    """Returns the nearer fit to the angle: with all free, or with the effort's gains.
-
-    Gains that nobody knows may lead the first into a valley of their own.
-    """
-    fits = (judge.moved(model), judge.serving(model).moved(model))
-    return min(fits, key=lambda m: float(m.errors.sum()))
+    return _Left(judge.output, nearest(judge, base), nearest(judge, best), sure)
 
 
 def _remaining(left: _Left) -> list[str]:
@@ -103,7 +94,7 @@ def _remaining(left: _Left) -> list[str]:
     texts = []
     for k, name in enumerate(left.problem.channels):
         before, after = left.base.errors[k], left.best.errors[k]
-        if left.sure and after > LEFT and after - 1.0 > REMAINING * (before - 1.0):
+        if left.sure and leaves_much(before, after):
             times = np.sqrt(after)
             texts.append(f"the {name} residual is {times:.1f} times the noise")
     return texts

@@ -25,7 +25,7 @@ from sysid.diagnosis.replay.command import WITHIN, command_path
 from sysid.diagnosis.replay.link import Link, LinkForce, link_step
 from sysid.diagnosis.replay.noise import spring_noise_gain
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import hand_mechanism, model_mechanism

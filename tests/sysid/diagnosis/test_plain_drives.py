@@ -10,7 +10,7 @@ from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.fits.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism

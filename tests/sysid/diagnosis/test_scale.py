@@ -10,7 +10,7 @@ from benchmarks.diagnosis.hidden.cases import drawn_case
 from benchmarks.diagnosis.hidden.conditions import Conditions
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 
 SMALL = Conditions(round_s=5.0, lowpass_hz=15.0)
 

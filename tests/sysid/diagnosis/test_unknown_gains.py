@@ -16,7 +16,7 @@ from sysid.diagnosis.fits.intervals import standard_errors
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism

@@ -18,7 +18,8 @@ from sysid.diagnosis.replay.band import BAND_STEPS, EVERY
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import Judge
-from sysid.diagnosis.search.search import Search, settled
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.verdict.observability import blind_effects
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log

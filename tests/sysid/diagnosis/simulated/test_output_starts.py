@@ -8,7 +8,7 @@ import pytest
 from support.plain_servo import KD, KP, problem_with
 
 from sysid.diagnosis.fits.candidate import fit_models
-from sysid.diagnosis.search.search import settled
+from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.simulated.closed_loop import Known, simulated
 from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import (

@@ -14,7 +14,8 @@ from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import Judge
-from sysid.diagnosis.search.search import Search, settled
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.verdict.sizes import agreed, shows, sizes_of
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log

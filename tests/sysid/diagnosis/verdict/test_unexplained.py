@@ -18,14 +18,15 @@ from sysid.diagnosis.fits.starts import starts_of
 from sysid.diagnosis.measured.segments import grid_step_s
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search import search as search_module
+from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.coupling import coupled, with_neighbour
 from sysid.diagnosis.search.judge import Judge
-from sysid.diagnosis.search.search import Search, settled
+from sysid.diagnosis.search.search import Search
+from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.verdict.unexplained import (
     _jumps,
     _Left,
     _left,
-    _nearest,
     _remaining,
     unexplained_signs,
 )
@@ -240,6 +241,6 @@ def test_a_valley_of_free_gains_is_no_sign():
     far, near = (SimpleNamespace(errors=np.array([0.0, x])) for x in (31.0, 1.0))
     served = SimpleNamespace(moved=lambda model: near)
     judge: Any = SimpleNamespace(moved=lambda model: far, serving=lambda model: served)
-    assert _nearest(judge, far) is near
+    assert nearest(judge, far) is near
     judge = SimpleNamespace(moved=lambda model: near, serving=lambda model: judge)
-    assert _nearest(judge, far) is near
+    assert nearest(judge, far) is near

@@ -1,0 +1,54 @@
+"""The angle is searched itself where the equations' answer leaves much of it.
+
+A logged effort that jumps with its targets is noisy, and a spring or a limit that the
+equations then do not show moves the angle by many times its noise. Such an answer is
+none: a search by the error of the angle, as where no effort was logged, can only do
+better, and counts if it explains what the first did not.
+"""
+
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
+from sysid.diagnosis.simulated.output_error import OutputProblem
+
+
+def nearest(judge: Judge, model: Model) -> Model:
+    """Returns the nearer fit to the angle: with all free, or with the effort's gains.
+
+    Gains that nobody knows may lead the first into a valley of their own.
+    """
+    fits = (judge.moved(model), judge.serving(model).moved(model))
+    return min(fits, key=lambda m: float(m.errors.sum()))
+
+
+def leaves_much(before: float, after: float) -> bool:
+    """Whether of an error before causes more is left than noise and model error.
+
+    Args:
+        before: mean squared error of the nominal model, in units of its noise [1].
+        after: the same with the causes [1].
+    """
+    return after > LEFT and after - 1.0 > REMAINING * (before - 1.0)
+
+
+def unsolved(
+    judge: Judge, base: Model, best: Model, stage: list[Model]
+) -> tuple[OutputProblem, Model] | None:
+    """Returns from where the angle is searched; None where there is no need.
+
+    Args:
+        judge: of the search by equations.
+        base: its nominal model.
+        best: its answer.
+        stage: what it tried beside the nominal model alone, if its answer is none.
+    """
+    output = judge.output
+    if output is judge.problem or not isinstance(output, OutputProblem):
+        return None
+    if not output.repeat:  # only they show what is noise
+        return None
+    before, after = nearest(judge, base), nearest(judge, best)
+    if not leaves_much(before.errors[1], after.errors[1]):
+        return None
+    if not best.effects:
+        output.stages.setdefault((), stage)
+    return output, judge.moved(base)

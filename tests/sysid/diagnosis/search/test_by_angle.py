@@ -1,0 +1,63 @@
+"""When the angle is searched itself, and what counts of that."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sysid.diagnosis.search import by_angle
+from sysid.diagnosis.search import search as search_module
+from sysid.diagnosis.search.by_angle import leaves_much, unsolved
+
+
+def model(error, effects=()):
+    return SimpleNamespace(effects=effects, errors=np.array([0.0, error]))
+
+
+def judge_of(repeat=True, seen=True):
+    """A judge that sees models as they are."""
+    output = SimpleNamespace(repeat=repeat, stages={}) if seen else "equations"
+    judge: Any = SimpleNamespace(problem="equations", output=output)
+    judge.moved, judge.serving = (lambda m: m), (lambda m: judge)
+    return judge
+
+
+def test_much_is_more_than_noise_and_than_what_a_model_errs_by():
+    assert leaves_much(6.2, 6.2)
+    assert not leaves_much(1.6, 1.6)
+    assert not leaves_much(100.0, 10.0)
+    assert leaves_much(100.0, 30.0)
+
+
+@pytest.mark.parametrize(
+    ("base", "best", "repeat", "searched"),
+    [
+        (6.2, 6.2, True, True),
+        (6.2, 6.2, False, False),  # what is left may be noise
+        (1.6, 1.6, True, False),
+        (9.0, 1.1, True, False),
+    ],
+)
+def test_an_angle_that_no_answer_explains_is_searched_itself(
+    base, best, repeat, searched, monkeypatch
+):
+    monkeypatch.setattr(by_angle, "OutputProblem", SimpleNamespace)
+    judge, stage, nominal = judge_of(repeat), [model(1.0)], model(base)
+    best = nominal if best == base else model(best, ("deadband",))
+    found = unsolved(judge, nominal, best, stage)
+    assert (found is not None) == searched
+    if found is not None:
+        assert found == (judge.output, nominal)
+        assert judge.output.stages == {(): stage}
+    assert unsolved(judge_of(seen=False), nominal, best, stage) is None
+
+
+@pytest.mark.parametrize(("left", "counts"), [(1.5, True), (5.9, False)])
+def test_a_search_of_the_angle_counts_if_it_explains(left, counts, monkeypatch):
+    base, best = model(6.2), model(left, ("compliance",))
+    again = SimpleNamespace(base=base, best=best)
+    monkeypatch.setattr(search_module, "unsolved", lambda *args: ("angle", base))
+    monkeypatch.setattr(search_module, "_searched", lambda problem, model: again)
+    first: Any = SimpleNamespace(judge=None, base=base, best=base, rejected=[])
+    assert (search_module._by_angle(first) is again) == counts
