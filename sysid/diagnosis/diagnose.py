@@ -21,6 +21,7 @@ from sysid.diagnosis.fits.space import make_space
 from sysid.diagnosis.measured.in_time import Age
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.track import all_tracks
+from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.search import Examined, search
 from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.simulated.output_error import OutputProblem
@@ -110,11 +111,15 @@ def _nearer(first: Examined, again: Examined) -> Examined:
 
 
 def _left(examined: Examined) -> float:
-    """Returns what a joint's best model leaves, Σ r²; all where it was not examined."""
+    """Returns what a joint's best model leaves, Σ r²; all where it was not examined.
+
+    Of the angle, where it can be simulated: one search may be by it, and one not.
+    """
     found = examined.search
     if found is None:
         return np.inf
-    raw = found.problem.raw(found.best.fit.theta[None], weigh=False)
+    best = nearest(found.judge, found.best)
+    raw = found.judge.output.raw(best.fit.theta[None], weigh=False)
     return float(np.sum(raw**2))
 
 

@@ -1,6 +1,7 @@
 """Readings of a late sensor, and the joints beside it."""
 
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -37,8 +38,11 @@ def examined(joint, effects=(), left=0.0):
         raw=lambda thetas, weigh: np.array([left]),
         space=SimpleNamespace(values=lambda thetas: (values, None)),
     )
-    best = SimpleNamespace(effects=effects, fit=SimpleNamespace(theta=np.zeros(1)))
-    found = SimpleNamespace(problem=problem, best=best)
+    fit = SimpleNamespace(theta=np.zeros(1))
+    best = SimpleNamespace(effects=effects, fit=fit, errors=np.ones(2))
+    judge: Any = SimpleNamespace(output=problem, moved=lambda model: model)
+    judge.serving = lambda model: judge
+    found = SimpleNamespace(problem=problem, best=best, judge=judge)
     return SimpleNamespace(track=SimpleNamespace(joint=joint), search=found)
 
 
