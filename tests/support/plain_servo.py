@@ -48,16 +48,18 @@ def problem_with(
     lost_s=(0.0, 0.0),
     believed=None,
     shown=1.0,
+    read=None,
 ):
     """The equations of one record of it; between two times rows are lost.
 
     `believed` are gains of which nothing is known, `shown` is the share of a target
-    that the torque in its row has.
+    that the torque in its row has, `read` is what the log says of an angle.
     """
     t_s = np.arange(0.0, 8.0, row_s)
     cmd = 1.2 * np.sin(2.0 * t_s) * np.cos(0.5 * t_s) + 0.3 * np.sin(7.0 * t_s)
     angle, torque = servo(cmd, row_s, late_s, push)
     torque -= (1.0 - shown) * KP * np.diff(cmd, prepend=0.0)
+    angle = read(angle) if read else angle
     columns = {"cmd.servo": cmd, "pos.servo": angle, "tau.servo": torque}
     kept = (t_s <= lost_s[0]) | (t_s >= lost_s[1])
     log = make_log(

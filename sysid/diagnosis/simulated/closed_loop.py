@@ -21,7 +21,6 @@ from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
-from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay import band, cascade
 from sysid.diagnosis.replay.beside import ages, beside
 from sysid.diagnosis.replay.effects import ENTER, KINDS
@@ -44,6 +43,11 @@ SLOW = 12.0
 
 WINDOW_S = 0.5
 """Length of a window that the logged effort drives [s]."""
+
+
+BEGIN_ROUNDS = 2
+"""Fixed-point steps to where an encoder reads an angle; each leaves the square of the
+share by which the encoder's slope is not one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,6 +197,17 @@ def _simulated(
         # The chain read the encoder before the joint moved on.
         return states, q, qd, x.encoder + q - middle
 
+    def placed(now, target, states, anew, q, qd):
+        # The encoder read the measured angle, so the joint is where it reads that.
+        at, speed = jnp.where(anew, now.pos, q), jnp.where(anew, now.vel, qd)
+        around, load = surroundings_at(cut.track, now, at - now.pos, mass, pushed)
+        for _ in range(BEGIN_ROUNDS):
+            joint = JointInput(target, at, speed, load, kp, kd, around)
+            x = chain_step(chain(now), states, joint, dt)[1]
+            at = jnp.where(anew, at - (x.encoder - now.pos), at)
+            speed = jnp.where(anew, speed - (x.encoder_speed - now.vel), speed)
+        return at, speed
+
     def step(carry, row):
         before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]
         before = beside(cut.whole, before, row[4] - 1.0, age)
@@ -200,7 +215,8 @@ def _simulated(
         states, q, qd, y = carry
         anew = row[3][:, None] > 0.0
         then = before[0]
-        q, qd = jnp.where(anew, then.pos, q), jnp.where(anew, then.vel, qd)
+        place = partial(placed, then, target[0], states, anew)
+        q, qd = jax.lax.cond(anew.any(), place, lambda *moved: moved, q, qd)
         states = _begun(cut.track, then, nuisance, effects, states, anew)
 
         def within(i, c):
@@ -213,8 +229,11 @@ def _simulated(
 
     first = with_candidates(jax.tree.map(lambda v: v[0], cut.before))
     q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
-    states = init_states(chain(first), cut.target[0, 0], q0, dt)
-    start = (states, q0, qd0, q0)
+    rests = init_states(chain(first), cut.target[0, 0], q0, dt)
+    everywhere = jnp.full_like(q0, True, bool)
+    at, speed = placed(first, cut.target[0, 0], rests, everywhere, q0, qd0)
+    states = init_states(chain(first), cut.target[0, 0], at, dt)
+    start = (states, at, speed, q0)
     rows = (cut.before, cut.motion, cut.target, cut.resumed, cut.number)
     angles = jax.lax.scan(step, start, rows)[1]
     whole = angles.reshape(window, -1, pieces, count)
@@ -259,30 +278,13 @@ def _cut(
         for name in ("gravity", "payload_kg", "kp", "kd")
     }
     motion = motion_of(track)
-    motion = replace(motion, push=_unsmoothed(motion.push))
+    motion = replace(motion, push=band.sharpened(motion.push))
     before = jax.tree.map(cut, _before(motion, dt))
     starts = jnp.arange(number) * window
     count = (jnp.arange(window)[:, None] + starts).astype(track.pos.dtype)
     track = replace(track, **constants)
     rows = jax.tree.map(cut, motion), before, aside, cut(track.resumed), count
     return _Windows(*rows, motion, track)
-
-
-def _unsmoothed(x: Float[Array, "t p"]) -> Float[Array, "t p"]:
-    """Sharpens what is smoothed and then read on straight lines between rows.
-
-    A Gaussian of σ steps and the lines keep e^{−σ²ω²/2} d / ω² of a frequency ω, with
-    d = 2 − 2 cos ω the second difference's; the inverse is 1 + (σ²/2 + 1/12) d + … d².
-    """
-    half = 0.5 * SMOOTH_STEPS**2
-    first, second = half + 1 / 12, half**2 / 2 + half / 6 + 1 / 90
-    bend = _second_difference(x)
-    return x - first * bend + second * _second_difference(bend)
-
-
-def _second_difference(x: Float[Array, "t p"]) -> Float[Array, "t p"]:
-    padded = jnp.concatenate([x[:1], x, x[-1:]])
-    return padded[2:] - 2.0 * x + padded[:-2]
 
 
 def _before(motion: Motion, dt: float) -> Motion:

@@ -42,6 +42,20 @@ def test_the_logged_effort_drives_where_the_law_is_unknown():
     assert error(problem, {"load_friction.drive_share": 0.98}) > 2.0 * right
 
 
+@pytest.mark.parametrize(
+    ("label", "value", "read"),
+    [
+        ("encoder_offset.offset_rad", 0.3, lambda q: q + 0.3),
+        ("encoder_scale.scale", 1.25, lambda q: 1.25 * q),
+    ],
+)
+def test_a_window_begins_where_the_encoder_reads_what_it_read(label, value, read):
+    """Begun at the reading, the joint would read another angle for a whole window."""
+    driven = {"known": "mechanics", "row_s": 0.002}
+    right = error(problem_with(**driven))
+    assert error(problem_with(**driven, read=read), {label: value}) < 1.3 * right
+
+
 def test_behind_lost_targets_the_simulation_begins_anew():
     problem = problem_with(row_s=0.004, lost_s=(3.01, 3.13))
     track, dt = problem.data.track, problem.data.dt
