@@ -175,7 +175,6 @@ def _slot(effect: str, name: str, parameter: Parameter, size: float | None) -> S
     elif identity == 1.0:
         slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,
                     (-0.3, -0.05, 0.05, 0.3), True)  # fmt: skip
-        slot = replace(slot, released_sd=3.0 * math.log(parameter.prior.spread))
     else:
         slot = _linear(effect, name, parameter, size)
     if effect == "command_quantization":

@@ -15,3 +15,13 @@ def test_some_start_is_near_every_limit_of_speed_that_a_record_meets(name):
         starts = slot.value(np.array(slot.starts))
         for limit in np.geomspace(0.7 * usual, max(fastest, 3.0 * usual), 40):
             assert np.abs(np.log(starts / limit)).min() < 0.06
+
+
+@pytest.mark.parametrize(
+    "effect", ["encoder_scale", "stiffness", "encoder_eccentricity"]
+)
+def test_no_prior_holds_back_the_size_of_one_effect_more_than_of_another(effect):
+    """A score has no part of it: the effect that may go further would seem nearer."""
+    space = problem_with().space
+    free = space.prior_sds((effect,))[space.of(effect)]
+    assert free == pytest.approx(5.0)
