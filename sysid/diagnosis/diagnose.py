@@ -134,8 +134,8 @@ def _examined(
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)
-    alone = not np.any(np.asarray(track.track.others_nm))
-    problem = problem_of(track, logs, mechanism, not alone)
+    company = np.any(np.asarray(track.track.others_nm)) and track.other != track.joint
+    problem = problem_of(track, logs, mechanism, bool(company))
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
     result = search(problem)
@@ -153,7 +153,7 @@ def problem_of(
         track: its measured motion.
         logs: the records.
         mechanism: the nominal simulation.
-        company: whether other joints move too.
+        company: whether another joint, which may pull on it, moves too.
     """
     drive = mechanism.drives[track.joint]
     known = {"others_nm": True, "gravity": True, "other_q": company}

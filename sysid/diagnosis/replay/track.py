@@ -15,6 +15,7 @@ from sysid.diagnosis.measured.segments import Piece, grid_step_s, pieces_of
 from sysid.diagnosis.replay.band import BAND_STEPS, sample_rows
 from sysid.diagnosis.replay.cascade import begins_anew, cascade_of
 from sysid.diagnosis.replay.motion import JointTrack, Track
+from sysid.diagnosis.replay.neighbours import pulling
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.timing_uncertainty import (
     sampling_uncertainty,
@@ -268,7 +269,7 @@ def _neighbour_pulls(one: _Joint) -> dict[str, np.ndarray]:
                 one.stacked([e[:, k] for e in nm]),
             ]
         )
-        for k in neighbours(one.mechanism.model, joints, one.j)
+        for k in pulling(one.mechanism, joints, one.j, one.pieces)
     }
 
 
@@ -276,15 +277,6 @@ def _alike(targets: list[np.ndarray]) -> list[np.ndarray]:
     """Repeats the oldest target where a record of another rate has more of them."""
     most = max(x.shape[1] for x in targets)
     return [np.pad(x, [(0, 0), (most - x.shape[1], 0)], "edge") for x in targets]
-
-
-def neighbours(model, joints: tuple[str, ...], j: int) -> list[int]:
-    """Returns the joints on the parent's body and on its children; else itself."""
-    body = [int(model.jnt_bodyid[model.joint(n).id]) for n in joints]
-    parents = [int(model.body_parentid[b]) for b in body]
-    before = [k for k, other in enumerate(body) if other == parents[j]]
-    behind = [k for k, parent in enumerate(parents) if parent == body[j]]
-    return before + behind or [j]
 
 
 def _uncertainty(
