@@ -122,49 +122,6 @@ def off_prior(problem: Problem, model: Model, effect: str) -> float:
     return max(away, default=0.0)
 
 
-def at_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
-    """Coordinates of a fit with its nuisance parameters at their nominal values.
-
-    θ_i = θ̂_i for the parameters of the model's effects, else θ⁰_i.
-
-    Args:
-        problem: residuals of a joint.
-        model: a fitted model.
-
-    Returns:
-        Coordinates, in units of their scales [1].
-
-    Source:
-        Ours: starts from which nuisance parameters cannot compensate each other.
-    """
-    return with_effects(problem, problem.space.nominal, model, model.effects)
-
-
-def with_effects(
-    problem: Problem,
-    origin: Float[np.ndarray, " n"],
-    model: Model,
-    effects: Sequence[str],
-) -> Float[np.ndarray, " n"]:
-    """Coordinates of an origin, with effects of a model as that was fitted.
-
-    θ_i = θ̂_i for the parameters of the effects, else those of the origin.
-
-    Args:
-        problem: residuals of a joint.
-        origin: coordinates, in units of their scales [1].
-        model: a fitted model.
-        effects: those of the model that are put there.
-
-    Source:
-        Ours.
-    """
-    theta = origin.copy()
-    kept = [i for e in effects for i in problem.space.of(e)]
-    theta[kept] = model.fit.theta[kept]
-    return theta
-
-
 def noise_cost(problem: Problem, theta: Float[np.ndarray, " n"], error: float) -> float:
     """Log-likelihood that amplified noise costs the mechanics: Δ log L = n log A.
 

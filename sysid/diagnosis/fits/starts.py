@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.fits.candidate import Model, at_nominal, off_prior
+from sysid.diagnosis.fits.candidate import Model, off_prior
 from sysid.diagnosis.fits.grids import grid_optima
+from sysid.diagnosis.fits.origins import near_nominal
 from sysid.diagnosis.fits.problem import Problem
 
 AROUND = (0.02, 0.002)
@@ -28,7 +29,7 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     for name in names:
         if off_prior(problem, model, name) > FAR_SD:
             result[name].append(model.fit.theta)
-    fitted, nominal = model.fit.theta, at_nominal(problem, model)
+    fitted, nominal = model.fit.theta, near_nominal(problem, model)
     smooth = [name for name in names if not many_optima(problem, name)]
     for origin, some, count in ((fitted, names, 2), (nominal, smooth, 1)):
         for name, best in best_starts(problem, model, origin, some, count).items():

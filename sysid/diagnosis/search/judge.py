@@ -31,11 +31,11 @@ from jaxtyping import Float
 from sysid.diagnosis.fits.candidate import (
     CONVERGED,
     Model,
-    at_nominal,
     fit_models,
     log_likelihood_gain,
 )
 from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.origins import at_nominal
 from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.space import SIGMA

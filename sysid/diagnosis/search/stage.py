@@ -6,12 +6,11 @@ from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import (
     CONVERGED,
     Model,
-    at_nominal,
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
-    with_effects,
 )
+from sysid.diagnosis.fits.origins import near_nominal, with_effects
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.starts import many_optima, starts_of
 from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
@@ -157,7 +156,7 @@ def _refined(
     near += [m for m in close if m not in near]
     jobs = [(m.effects, m.fit.theta) for m in near] + alone
     jobs += [
-        (m.effects, at_nominal(problem, m))
+        (m.effects, near_nominal(problem, m))
         for m in near
         if m.penalty > OFF_PRIOR_PENALTY
     ]

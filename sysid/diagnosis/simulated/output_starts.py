@@ -11,13 +11,8 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
-from sysid.diagnosis.fits.candidate import (
-    CONVERGED,
-    Model,
-    at_nominal,
-    fit_models,
-    with_effects,
-)
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
+from sysid.diagnosis.fits.origins import at_nominal, near_nominal, with_effects
 from sysid.diagnosis.fits.starts import best_starts, many_optima
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
@@ -43,9 +38,8 @@ def settled_output(
     """
     effects = equations.effects
     fitted = equations.fit.theta
-    loose = np.array([np.isinf(slot.prior_sd) for slot in output.space.slots])
-    begin = at_nominal(output, equations)
-    starts = np.stack([begin, np.where(loose, fitted, begin), fitted])
+    begin = at_nominal(output, equations), near_nominal(output, equations)
+    starts = np.stack([*begin, fitted])
     raw = output.raw(starts, weigh=False)
     nearest = raw[np.argmin(np.sum(raw**2, (1, 2, 3)))]
     problem = output.with_noise(nearest)

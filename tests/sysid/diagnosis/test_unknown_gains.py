@@ -13,6 +13,7 @@ from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.origins import near_nominal
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
@@ -123,3 +124,16 @@ def test_gains_are_no_surer_than_the_effort_shows_them():
     noisy = replace(base, fit=replace(fit, jacobian=1e-3 * fit.jacobian))
     slot = Judge(problem, base).serving(noisy).output.space.slots[index]
     assert slot.prior_sd > 2.0 * SIGMA * GAIN_TOLERANCE
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_fits_begin_anew_with_free_gains_as_they_were_found(free):
+    """They have no nominal value; known ones have, and masses do."""
+    logs, mechanism = recorded(0.1, free)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    values = problem.space.values(near_nominal(problem, base)[None])[0]
+    kept = values["stiffness"]["scale"][0]
+    assert (kept > 1.4) == free  # it is 2, and friction takes a part of it
+    (load,) = problem.space.of("payload_mass")
+    assert base.fit.theta[load] != near_nominal(problem, base)[load] == 0.0

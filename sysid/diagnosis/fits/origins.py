@@ -1,0 +1,72 @@
+"""Places where fits begin anew: a model's effects, and all else as it is known."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.problem import Problem
+
+
+def at_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
+    """Coordinates of a fit with its nuisance parameters at their nominal values.
+
+    θ_i = θ̂_i for the parameters of the model's effects, else θ⁰_i.
+
+    Args:
+        problem: residuals of a joint.
+        model: a fitted model.
+
+    Returns:
+        Coordinates, in units of their scales [1].
+
+    Source:
+        Ours: starts from which nuisance parameters cannot compensate each other.
+    """
+    return with_effects(problem, problem.space.nominal, model, model.effects)
+
+
+def near_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
+    """As `at_nominal`, but what is declared free stays as it was fitted.
+
+    It has no nominal value: at any other, all that is at its own is compared by what a
+    wrong gain does, and from there a fit moves masses before it finds the gain.
+
+    Args:
+        problem: residuals of a joint.
+        model: a fitted model.
+
+    Returns:
+        Coordinates, in units of their scales [1].
+
+    Source:
+        Ours.
+    """
+    free = np.isinf([slot.prior_sd for slot in problem.space.slots])
+    return np.where(free, model.fit.theta, at_nominal(problem, model))
+
+
+def with_effects(
+    problem: Problem,
+    origin: Float[np.ndarray, " n"],
+    model: Model,
+    effects: Sequence[str],
+) -> Float[np.ndarray, " n"]:
+    """Coordinates of an origin, with effects of a model as that was fitted.
+
+    θ_i = θ̂_i for the parameters of the effects, else those of the origin.
+
+    Args:
+        problem: residuals of a joint.
+        origin: coordinates, in units of their scales [1].
+        model: a fitted model.
+        effects: those of the model that are put there.
+
+    Source:
+        Ours.
+    """
+    theta = origin.copy()
+    kept = [i for e in effects for i in problem.space.of(e)]
+    theta[kept] = model.fit.theta[kept]
+    return theta
