@@ -134,8 +134,7 @@ def _examined(
     pushed = bool(np.any(np.asarray(track.track.ext)))
     if not (moved or pushed) or not np.any(track.valid):
         return Examined(track, None, None)
-    company = np.any(np.asarray(track.track.others_nm)) and track.other != track.joint
-    problem = problem_of(track, logs, mechanism, bool(company))
+    problem = problem_of(track, logs, mechanism, track.other != track.joint)
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
     result = search(problem)
