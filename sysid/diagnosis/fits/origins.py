@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float
 
-from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
 from sysid.diagnosis.fits.problem import Problem
 
 
@@ -45,6 +45,23 @@ def near_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
     """
     free = np.isinf([slot.prior_sd for slot in problem.space.slots])
     return np.where(free, model.fit.theta, at_nominal(problem, model))
+
+
+def begun_anew(problem: Problem, model: Model) -> Model:
+    """Fits again from `near_nominal`, where something is free; returns the better.
+
+    On the way from a wrong gain to the right one times and masses move for it, and may
+    stay where they went.
+
+    Args:
+        problem: residuals of a joint.
+        model: a fitted model.
+    """
+    if not any(np.isinf(slot.prior_sd) for slot in problem.space.slots):
+        return model
+    start = near_nominal(problem, model)
+    again = fit_models(problem, [model.effects], [start], rounds=CONVERGED)[0]
+    return min(model, again, key=lambda m: m.fit.cost)
 
 
 def with_effects(

@@ -157,10 +157,11 @@ def _searched(problem: Problem, base: Model) -> Search:
             fresh = {m.effects: m for m in better}
             stage = [fresh.get(m.effects, m) for m in stage]
             winner = _confirmed(judge, again, better)
-            if winner is None:
-                break
             if again.score < best.score:
                 base = again if not best.effects else base
+                best = again
+            if winner is None:
+                break
         best = pruned(problem, winner, base)
         if best.effects != winner.effects:
             break

@@ -13,7 +13,7 @@ from envs.physics.quiet_mujoco import mujoco
 from sysid.diagnosis.diagnose import diagnose, problem_of
 from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.fits.intervals import standard_errors
-from sysid.diagnosis.fits.origins import near_nominal
+from sysid.diagnosis.fits.origins import begun_anew, near_nominal
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
@@ -137,3 +137,18 @@ def test_fits_begin_anew_with_free_gains_as_they_were_found(free):
     assert (kept > 1.4) == free  # it is 2, and friction takes a part of it
     (load,) = problem.space.of("payload_mass")
     assert base.fit.theta[load] != near_nominal(problem, base)[load] == 0.0
+
+
+@pytest.mark.parametrize("free", [True, False])
+def test_a_nominal_fit_that_went_astray_for_a_gain_comes_back(free):
+    logs, mechanism = recorded(0.0, free)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    theta = np.array(base.fit.theta)
+    (load,) = problem.space.of("payload_mass")
+    theta[load] += 1.0
+    astray = replace(base.fit, theta=theta, cost=2.0 * base.fit.cost)
+    model = replace(base, fit=astray)
+    back = begun_anew(problem, model)
+    assert (back is not model) == free
+    assert not free or back.fit.cost < 1.05 * base.fit.cost
