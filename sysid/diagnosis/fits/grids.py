@@ -20,6 +20,9 @@ MOST_GRIDS = 6e7
 OPTIMA = 16
 """Number of local optima of a grid whose starts are tried in the whole chain."""
 
+APART = 0.125
+"""How much further the largest target goes from one grid to the next [grids]."""
+
 FAINT = 12.0
 """Log-likelihood that the finest grid gains whose rounding is looked for. Of K grids
 the best gains log K by chance, which is less for all that are tried."""
@@ -68,6 +71,23 @@ def grid_optima(
     return grids[best] / slot.scale
 
 
+def chance_gain(problem: Problem, theta: Float[np.ndarray, " n"]) -> float:
+    """Log K of the K grids that are no finer than that of a model [nat].
+
+    Args:
+        problem: residuals of a joint.
+        theta: coordinates of the model, with a grid Δ [1].
+
+    Source:
+        The largest of s x − s² / 2 over K and every size s of an error, where x is
+        normal, is about log K: what the best of K grids gains of noise alone.
+    """
+    (index,) = problem.space.of("command_quantization")
+    step = float(problem.space.slots[index].value(theta[index]))
+    largest = float(np.abs(np.asarray(problem.data.track.held)).max())
+    return float(np.log1p(largest / (APART * step))) if step > 0.0 else 0.0
+
+
 def _finest(problem: Problem, seen: int) -> float:
     """Δ = (σ / k_p) √(24 Λ / n), whose rounding gains Λ = n (k_p Δ)² / 24 σ² nat.
 
@@ -86,7 +106,7 @@ def _grids(slot: Slot, targets: np.ndarray, finest: float) -> Float[np.ndarray, 
     the finest would be too many, the last ones are left out.
     """
     coarse, fine = (1.0 / (slot.scale * u) for u in reversed(slot.starts))
-    apart = 0.125 / max(float(np.abs(targets).max()), 1e-12)
+    apart = APART / max(float(np.abs(targets).max()), 1e-12)
     most = max(MOST_GRIDS / targets.size, 1e3)
     reach = min(1.0 / finest, coarse + apart * most)
     count = (max(fine, reach) - coarse) / apart + 2.0

@@ -13,6 +13,7 @@ from sysid.diagnosis.fits.candidate import (
     log_likelihood_gain,
     off_prior,
 )
+from sysid.diagnosis.fits.grids import chance_gain
 from sysid.diagnosis.fits.intervals import timing_error
 from sysid.diagnosis.fits.problem import Problem
 
@@ -56,9 +57,18 @@ def accepted(problem: Problem, smaller: Model, larger: Model, base: Model) -> bo
         return False
     if "load_friction" in added and not _predicts_effort(problem, smaller, larger):
         return False
-    threshold = SPRING_THRESHOLD if "compliance" in added else THRESHOLD
+    threshold = _threshold(problem, larger, added)
     removes = _removes_enough(problem, smaller, larger, base)
     return gain > max(threshold, least) and removes
+
+
+def _threshold(problem: Problem, model: Model, added: list[str]) -> float:
+    """What effects must gain, beyond what the best of many grids gains by chance."""
+    if "compliance" in added:
+        return SPRING_THRESHOLD
+    if "command_quantization" in added:
+        return THRESHOLD + chance_gain(problem, model.fit.theta)
+    return THRESHOLD
 
 
 def _within_cycle(problem: Problem, model: Model, effect: str) -> bool:
