@@ -6,16 +6,17 @@ sent targets alone, from the start of every piece; where it is not, the logged e
 drives the joint, in windows too short for errors to add up (multiple shooting).
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 
-import flax.struct
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float, Int
+from jaxtyping import Array, Bool, Float, Int
 
 from envs.actuator.chain import JointInput, chain_step, init_states
+from envs.actuator.effect import Substep
 from envs.actuator.joint import joint_step
 from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
@@ -25,10 +26,11 @@ from sysid.diagnosis.replay import band, cascade
 from sysid.diagnosis.replay.beside import ages, beside
 from sysid.diagnosis.replay.effects import ENTER, KINDS
 from sysid.diagnosis.replay.model import Nuisance
-from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
+from sysid.diagnosis.replay.motion import Motion, Track, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.simulated.part_targets import part_targets
+from sysid.diagnosis.simulated.windows import cut_windows
 
 SUBSTEP_S = 0.00025
 """Longest substep of the simulation [s]."""
@@ -132,27 +134,6 @@ def _parts(whole_s: float, most_s: float) -> int:
     return max(1, int(np.ceil(whole_s / most_s - 0.01)))
 
 
-@flax.struct.dataclass
-class _Windows:
-    """The motion at the end and start of steps, in windows side by side, and targets.
-
-    Those are the mean targets of the substeps. Where the record resumes, the joint is
-    where it was measured.
-
-    Attributes:
-        number: of the steps, in every window.
-        whole: the motion before it is cut.
-    """
-
-    motion: Motion
-    before: Motion
-    target: Float[Array, "w k l c"]
-    resumed: Float[Array, "w l"]
-    number: Float[Array, "w n"]
-    whole: Motion
-    track: Track
-
-
 @partial(jax.jit, static_argnums=(4, 5, 6, 7, 8))
 def _simulated(
     track: Track,
@@ -169,11 +150,7 @@ def _simulated(
     targets, age = moved
     effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in program}
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
-    pushed = nuisance.push_gain[None, :]
-    count = gain.shape[1]
-    steps, pieces = track.pos.shape
-    each = substeps // targets.shape[2]
-    cut = _cut(track, jnp.moveaxis(targets, 0, -1), window, dt * substeps)
+    cut = cut_windows(track, jnp.moveaxis(targets, 0, -1), window, dt * substeps)
     effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
     model = [(KINDS[n], p) for n, p in effects.items()]
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
@@ -182,31 +159,28 @@ def _simulated(
     def chain(now):
         return (*model, (ENTER, {**enters, "effort": gain * now.effort}))
 
+    def act(now, target, states, at, qd, away):
+        pushed = nuisance.push_gain[None, :]
+        around, load = surroundings_at(cut.track, now, away, mass, pushed)
+        joint = JointInput(target, at, qd, load, kp, kd, around)
+        return chain_step(chain(now), states, joint, dt)
+
     def substep(carry, there, target):
         (states, q, qd, _), (now, turned) = carry, there
-        # Angles at the middle of a substep, where its mean target is, and speeds at its
-        # ends, with the damping of their mean: right to second order in the substep.
+        # Angles at its middle, speeds at its ends, damped by their mean: second order.
         middle = q + 0.5 * dt * qd
-        away = middle - now.pos + turned
-        around, load = surroundings_at(cut.track, now, away, mass, pushed)
-        joint = JointInput(target, middle, qd, load, kp, kd, around)
-        states, x = chain_step(chain(now), states, joint, dt)
+        states, x = act(now, target, states, middle, qd, middle - now.pos + turned)
         x = replace(x, damping=0.5 * x.damping * (1.0 - float(driven)))
         _, qd = joint_step(x, mass * now.inertia, dt)
         q = middle + 0.5 * dt * qd
         # The chain read the encoder before the joint moved on.
         return states, q, qd, x.encoder + q - middle
 
-    def placed(now, target, states, anew, q, qd):
-        # The encoder read the measured angle, so the joint is where it reads that.
-        at, speed = jnp.where(anew, now.pos, q), jnp.where(anew, now.vel, qd)
-        around, load = surroundings_at(cut.track, now, at - now.pos, mass, pushed)
-        for _ in range(BEGIN_ROUNDS):
-            joint = JointInput(target, at, speed, load, kp, kd, around)
-            x = chain_step(chain(now), states, joint, dt)[1]
-            at = jnp.where(anew, at - (x.encoder - now.pos), at)
-            speed = jnp.where(anew, speed - (x.encoder_speed - now.vel), speed)
-        return at, speed
+    def placed(now, target, states, anew, *moved):
+        def read(at, qd):
+            return act(now, target, states, at, qd, at - now.pos)[1]
+
+        return _where_read(now, read, anew, *moved)
 
     def step(carry, row):
         before, after, target = with_candidates(row[0]), with_candidates(row[1]), row[2]
@@ -214,30 +188,49 @@ def _simulated(
         after = beside(cut.whole, after, row[4], age)
         states, q, qd, y = carry
         anew = row[3][:, None] > 0.0
-        then = before[0]
-        place = partial(placed, then, target[0], states, anew)
+        place = partial(placed, before[0], target[0], states, anew)
         q, qd = jax.lax.cond(anew.any(), place, lambda *moved: moved, q, qd)
-        states = _begun(cut.track, then, nuisance, effects, states, anew)
+        states = _begun(cut.track, before[0], nuisance, effects, states, anew)
 
         def within(i, c):
             share = (i + 0.5) / substeps
             now = jax.tree.map(lambda a, b: a + share * (b - a), before, after)
-            return substep(c, now, target[i // each])
+            return substep(c, now, target[i * len(target) // substeps])
 
         carry = jax.lax.fori_loop(0, substeps, within, (states, q, qd, y))
         return carry, carry[3]
 
     first = with_candidates(jax.tree.map(lambda v: v[0], cut.before))
-    q0, qd0 = (jnp.repeat(x, count, 1) for x in (first.pos, first.vel))
-    rests = init_states(chain(first), cut.target[0, 0], q0, dt)
-    everywhere = jnp.full_like(q0, True, bool)
-    at, speed = placed(first, cut.target[0, 0], rests, everywhere, q0, qd0)
-    states = init_states(chain(first), cut.target[0, 0], at, dt)
-    start = (states, at, speed, q0)
+    rest = partial(init_states, chain(first), cut.target[0, 0])
+    q0, always = jnp.repeat(first.pos, gain.size, 1), jnp.ones((1, 1), bool)
+    moving = placed(first, cut.target[0, 0], rest(q0, dt), always, q0, q0)
+    start = (rest(moving[0], dt), *moving, q0)
     rows = (cut.before, cut.motion, cut.target, cut.resumed, cut.number)
-    angles = jax.lax.scan(step, start, rows)[1]
-    whole = angles.reshape(window, -1, pieces, count)
-    return band.smooth(jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, count)[:steps])
+    return _joined(jax.lax.scan(step, start, rows)[1], track)
+
+
+def _joined(angles: Float[Array, "w l c"], track: Track) -> Float[Array, "t p c"]:
+    """Puts windows one behind the other again, and smooths as the track is."""
+    steps, pieces = track.pos.shape
+    whole = angles.reshape(len(angles), -1, pieces, angles.shape[-1])
+    whole = jnp.swapaxes(whole, 0, 1).reshape(-1, pieces, angles.shape[-1])
+    return band.smooth(whole[:steps])
+
+
+def _where_read(
+    now: Motion,
+    read: Callable[..., Substep],
+    anew: Bool[Array, "#l 1"],
+    q: Float[Array, "l c"],
+    qd: Float[Array, "l c"],
+) -> tuple[Float[Array, "l c"], Float[Array, "l c"]]:
+    """Puts what begins anew to where, and as fast as, the encoder read it."""
+    at, speed = jnp.where(anew, now.pos, q), jnp.where(anew, now.vel, qd)
+    for _ in range(BEGIN_ROUNDS):
+        x = read(at, speed)
+        at = jnp.where(anew, at - (x.encoder - now.pos), at)
+        speed = jnp.where(anew, speed - (x.encoder_speed - now.vel), speed)
+    return at, speed
 
 
 def _begun(track: Track, now: Motion, nuisance: Nuisance, effects, states, anew):
@@ -253,46 +246,3 @@ def _begun(track: Track, now: Motion, nuisance: Nuisance, effects, states, anew)
     anew = anew & (effects[cascade.NAME]["k_int"] > 0.0)
     begun = cascade.begun(states[at], anew, torque)
     return (*states[:at], begun, *states[at + 1 :])
-
-
-def _cut(
-    track: Track,
-    target: Float[Array, "t k p c"],
-    window: int,
-    dt: float,
-) -> _Windows:
-    """Cuts all along time into windows and lays them side by side."""
-    steps = len(track.pos)
-    number = -(-steps // window)
-    tail = number * window - steps
-
-    def cut(x):
-        wide = jnp.pad(x, [(0, tail)] + [(0, 0)] * (x.ndim - 1), "edge")
-        parts = wide.reshape(number, window, *x.shape[1:])
-        return jnp.swapaxes(parts, 0, 1).reshape(window, -1, *x.shape[2:])
-
-    moved = jnp.swapaxes(target, 1, 2)
-    aside = jnp.swapaxes(cut(moved), 1, 2)
-    constants = {
-        name: jnp.concatenate([getattr(track, name)] * number)
-        for name in ("gravity", "payload_kg", "kp", "kd")
-    }
-    motion = motion_of(track)
-    motion = replace(motion, push=band.sharpened(motion.push))
-    before = jax.tree.map(cut, _before(motion, dt))
-    starts = jnp.arange(number) * window
-    count = (jnp.arange(window)[:, None] + starts).astype(track.pos.dtype)
-    track = replace(track, **constants)
-    rows = jax.tree.map(cut, motion), before, aside, cut(track.resumed), count
-    return _Windows(*rows, motion, track)
-
-
-def _before(motion: Motion, dt: float) -> Motion:
-    """Returns the motion one step earlier; before the first row, as that moves."""
-    shifted = jax.tree.map(lambda v: jnp.concatenate([v[:1], v[:-1]]), motion)
-    pos, vel, acc = motion.pos[0], motion.vel[0], motion.acc[0]
-    return replace(
-        shifted,
-        pos=shifted.pos.at[0].set(pos - dt * vel + 0.5 * dt**2 * acc),
-        vel=shifted.vel.at[0].set(vel - dt * acc),
-    )
