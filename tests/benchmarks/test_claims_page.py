@@ -30,7 +30,7 @@ from benchmarks.claims.claims_page import (
 from fingers_mjx.studies.comparison.results import Results, read_results
 from fingers_mjx.studies.sweep.manifest import read_manifest
 
-FASTER, ALIKE = CLAIMS[0], CLAIMS[2]
+FASTER, ALIKE = CLAIMS[0], next(c for c in CLAIMS if c.paper is None)
 NOISE = 0.004 * np.cos(2.4 * np.arange(SEEDS))
 
 
@@ -77,6 +77,14 @@ def test_the_page_is_what_the_results_say():
     speeds: Any = results.values["ours"]["task_speed_mps"]
     speeds[0] += 0.01
     assert PAGE.read_text("utf-8") != page(results)
+
+
+def test_the_readme_quotes_the_page():
+    text = PAGE.read_text("utf-8")
+    readme = " ".join((PAGE.parents[2] / "README.md").read_text("utf-8").split())
+    for claim in CLAIMS[:2]:
+        row = next(x for x in text.splitlines() if x.startswith(f"| {claim.text}"))
+        assert row.split(" | ")[2] in readme
 
 
 @pytest.mark.parametrize(
