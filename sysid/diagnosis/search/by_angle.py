@@ -3,11 +3,12 @@
 A logged effort that jumps with its targets is noisy, and a spring or a limit that the
 equations then do not show moves the angle by many times its noise. Such an answer is
 none: a search by the error of the angle, as where no effort was logged, can only do
-better, and counts if it explains what the first did not.
+better, and counts if it explains what the first did not. The effort did not show what
+it names, so much of the angle's error has to go, however little remains.
 """
 
 from sysid.diagnosis.fits.candidate import Model
-from sysid.diagnosis.search.judge import LEFT, REMAINING, Judge
+from sysid.diagnosis.search.judge import LEAST_FALL, LEFT, REMAINING, Judge
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 
@@ -28,6 +29,17 @@ def leaves_much(before: float, after: float) -> bool:
         after: the same with the causes [1].
     """
     return after > LEFT and after - 1.0 > REMAINING * (before - 1.0)
+
+
+def explains(before: float, after: float) -> bool:
+    """Whether causes leave little of an error, and far less than was there.
+
+    Args:
+        before: mean squared error of the nominal model, in units of its noise [1].
+        after: the same with the causes [1].
+    """
+    fall = 1.0 - (after / before) ** 0.5
+    return fall > LEAST_FALL and not leaves_much(before, after)
 
 
 def unsolved(

@@ -19,7 +19,7 @@ from sysid.diagnosis.fits.candidate import (
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.likelihood.folds import shorter_blocks
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.by_angle import leaves_much, unsolved
+from sysid.diagnosis.search.by_angle import explains, unsolved
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.selection import accepted
@@ -124,7 +124,7 @@ def _by_angle(found: Search) -> Search:
         return found
     again = _searched(*start)
     left = again.base.errors[1], again.best.errors[1]
-    return found if leaves_much(*left) else again
+    return again if explains(*left) else found
 
 
 def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:

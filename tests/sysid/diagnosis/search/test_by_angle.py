@@ -53,9 +53,12 @@ def test_an_angle_that_no_answer_explains_is_searched_itself(
     assert unsolved(judge_of(seen=False), nominal, best, stage) is None
 
 
-@pytest.mark.parametrize(("left", "counts"), [(1.5, True), (5.9, False)])
-def test_a_search_of_the_angle_counts_if_it_explains(left, counts, monkeypatch):
-    base, best = model(6.2), model(left, ("compliance",))
+@pytest.mark.parametrize(
+    ("before", "left", "counts"),
+    [(6.2, 1.5, True), (6.2, 5.9, False), (2.4, 1.9, False)],
+)
+def test_a_search_of_the_angle_counts_if_it_explains(before, left, counts, monkeypatch):
+    base, best = model(before), model(left, ("compliance",))
     again = SimpleNamespace(base=base, best=best)
     monkeypatch.setattr(search_module, "unsolved", lambda *args: ("angle", base))
     monkeypatch.setattr(search_module, "_searched", lambda problem, model: again)

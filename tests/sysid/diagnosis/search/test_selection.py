@@ -115,6 +115,7 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     monkeypatch.setattr(searching, "output_problem", lambda p: None)
     monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
     monkeypatch.setattr(searching, "_searched", searched)
+    monkeypatch.setattr(searching, "_by_angle", lambda found: found)
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
