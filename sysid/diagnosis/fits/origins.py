@@ -43,8 +43,7 @@ def near_nominal(problem: Problem, model: Model) -> Float[np.ndarray, " n"]:
     Source:
         Ours.
     """
-    free = np.isinf([slot.prior_sd for slot in problem.space.slots])
-    return np.where(free, model.fit.theta, at_nominal(problem, model))
+    return np.where(_free(problem), model.fit.theta, at_nominal(problem, model))
 
 
 def begun_anew(problem: Problem, model: Model) -> Model:
@@ -57,11 +56,16 @@ def begun_anew(problem: Problem, model: Model) -> Model:
         problem: residuals of a joint.
         model: a fitted model.
     """
-    if not any(np.isinf(slot.prior_sd) for slot in problem.space.slots):
+    if not _free(problem).any():
         return model
     start = near_nominal(problem, model)
     again = fit_models(problem, [model.effects], [start], rounds=CONVERGED)[0]
     return min(model, again, key=lambda m: m.fit.cost)
+
+
+def _free(problem: Problem) -> np.ndarray:
+    """Which parameters have no nominal value."""
+    return np.isinf([slot.prior_sd for slot in problem.space.slots])
 
 
 def with_effects(
