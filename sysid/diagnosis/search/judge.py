@@ -19,7 +19,7 @@ effect, those that the logged effort shows to that model, as surely as it does: 
 ones would do in the simulation what the effect does. The likelihood need not gain where
 repeats show that the logged effort has no other explanation: what parameters a little
 out of their tolerances hide of the angle, as a servo's damping hides friction, they do
-not hide of the effort.
+not hide of the effort, whose error then must fall by that share.
 """
 
 from dataclasses import replace
@@ -238,9 +238,14 @@ class Judge:
         return self.prefers(smaller, larger) and self._matters(smaller, larger)
 
     def _matters(self, smaller: Model, larger: Model) -> bool:
-        """Whether of the angle's error much goes, or all that is more than noise."""
+        """Whether much goes of the angle's error or of an explained effort's.
+
+        Or all of the angle's that is more than noise.
+        """
         worse, better = self.pair(smaller, larger)
-        if self.fall(worse, better) > LEAST_FALL:
+        left = (larger.errors.max() / smaller.errors.max()) ** 0.5
+        explained = self._explains(smaller, larger) and 1.0 - left > LEAST_FALL
+        if explained or self.fall(worse, better) > LEAST_FALL:
             return True
         before, after = worse.errors.max(), better.errors.max()
         return bool(self.problem.repeat and before > LEFT > after)

@@ -110,6 +110,17 @@ def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
     assert says(Said(1.4, 7.4), before=381.0, after=0.5)
 
 
+@pytest.mark.parametrize(
+    ("t", "before", "after", "counts"),
+    [(1.7, 135.0, 1.3, True), (1.7, 2.1, 1.2, False), (-1.7, 135.0, 1.3, False)],
+)
+def test_such_an_effort_matters_itself_where_little_goes_of_the_angle(
+    t, before, after, counts
+):
+    """Viscous friction: 135 times the noise becomes 1.3, and 2 % of the angle's go."""
+    assert says(Said(6.4, t, fall=0.02), before, after) is counts
+
+
 def test_without_repeats_next_to_nothing_must_remain():
     """A torque limit: 17,495 times what neighbours do not share becomes 50."""
     assert says(Said(1.4, 7.4, repeat=False), before=17_495.0, after=50.0)
@@ -124,7 +135,7 @@ def test_without_repeats_next_to_nothing_must_remain():
         {"effort": False},
         {"after": 100.0},
         {"before": 1.8},
-        {"fall": 0.9 * LEAST_FALL},
+        {"after": 2.1, "fall": 0.9 * LEAST_FALL},
     ],
 )
 def test_it_does_not_count_otherwise(changed):
