@@ -22,7 +22,7 @@ from sysid.diagnosis.likelihood.whitening import (
     correlation_time,
 )
 from sysid.diagnosis.replay.band import sample_rows
-from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
+from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
 from sysid.diagnosis.simulated.closed_loop import Known, simulated
 
 FAR = 1e3
@@ -76,6 +76,8 @@ class OutputProblem(Problem):
         When a servo takes a target is known to its cycle, so an angle that moves at
         speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²),
         with the largest |v| of three samples about it: a fast servo starts between two.
+        What others push is known as well as rows sample their motion: what is lost of
+        it, u of `sampling_uncertainty`, may move this joint by u / kp more.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -88,7 +90,8 @@ class OutputProblem(Problem):
         """
         valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
         speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
-        unsure = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
+        late = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
+        unsure = np.hypot(late, self._pushed()[rows])
         if self.repeat:
             series, counts = self.repeat.differences(raw[1], valid)
             size = bulk_deviation(series[counts]) if counts.any() else 1.0
@@ -102,6 +105,12 @@ class OutputProblem(Problem):
             noise = Noise(np.zeros(0), size)
         weights = np.stack([np.ones_like(weight), weight])
         return replace(self, noise=(self.noise[0], noise), weight=weights)
+
+    def _pushed(self) -> Float[np.ndarray, "t p"]:
+        """Returns how far pushes of others, as sampled, may lead the angle astray."""
+        track = self.data.track
+        lost = sampling_uncertainty(np.asarray(track.push, float))
+        return lost / np.maximum(np.asarray(track.kp, float), 1e-12)
 
     def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes what a model leaves as noise: s'² = max(s_y², τ mean r²).

@@ -1,5 +1,6 @@
 """The output error: which records it decides, its noise, and how candidates compare."""
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -43,6 +44,21 @@ def test_what_an_error_leaves_is_noise_but_never_less_than_the_readings():
     )
     readings = output.data.noise[0]
     assert output.with_remaining(0.0 * left).noise[1].deviation >= readings
+
+
+def test_where_others_push_faster_than_is_sampled_the_angle_counts_less():
+    output = output_problem(silent())
+    track = output.data.track
+    push = np.zeros(np.shape(track.push))
+    half = len(push) // 2
+    push[half::2] = 0.01 * float(np.min(np.asarray(track.kp)))
+    pushed = replace(output, data=replace(output.data, track=replace(track, push=push)))
+    rng = np.random.default_rng(0)
+    raw = np.stack([0.0 * output.valid[1], rng.normal(0.0, 3e-4, output.fold.shape)])
+    share = pushed.with_noise(raw).weight[1] / output.with_noise(raw).weight[1]
+    first = len(share) // 2
+    assert share[: first - 4] == pytest.approx(1.0, rel=0.1)
+    assert np.all(share[first + 4 :] < 0.5)
 
 
 def test_a_fit_to_the_angle_finds_a_delay_that_equations_only_guess():
