@@ -52,8 +52,11 @@ def ages(params: Params, dt: float) -> Float[Array, "2 c"]:
 
 
 def beside(
-    motion: Motion, now: Motion, steps: Float[Array, " w"], age: Float[Array, "2 c"]
-) -> tuple[Motion, Float[Array, "wp c"]]:
+    motion: Motion,
+    now: Motion,
+    steps: Float[Array, " w"],
+    age: Float[Array, "2 c"] | None,
+) -> tuple[Motion, Float[Array, "wp #c"]]:
     """Reads at one step what other joints did; on straight lines between steps.
 
     Args:
@@ -61,7 +64,7 @@ def beside(
         now: the same at the step, with a last axis for the candidates; windows side by
             side.
         steps: number t of the step, in every window.
-        age: of the readings of every candidate; see `ages`.
+        age: of the readings of every candidate, see `ages`; None where none is late.
 
     Returns:
         The motion at the step, and how far the joint has turned since then [rad].
@@ -69,6 +72,8 @@ def beside(
     Source:
         Ours.
     """
+    if age is None:
+        return now, jnp.zeros_like(now.pos)
     place = steps[:, None] * (1.0 - age[1]) - age[0]
     fields = {name: getattr(motion, name) for name in ("pos", *BESIDE)}
     same = {name: getattr(now, name) for name in fields}

@@ -104,7 +104,9 @@ def simulated(
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
         params, nuisance = problem.space.values(thetas[lanes])
         acting = {name: params[name] for name in program}
-        moved = (targets[lanes], ages(params, dt))
+        age = ages(params, dt)
+        # What others do is carried once for all where it was measured in time.
+        moved = (targets[lanes], age if np.any(age) else None)
         out = _simulated(track, moved, acting, nuisance, program, *fixed)
         return lanes_first(out, count)[:, rows]
 
@@ -137,7 +139,7 @@ def _parts(whole_s: float, most_s: float) -> int:
 @partial(jax.jit, static_argnums=(4, 5, 6, 7, 8))
 def _simulated(
     track: Track,
-    moved: tuple[Float[Array, "c t k p"], Float[Array, "2 c"]],
+    moved: tuple[Float[Array, "c t k p"], Float[Array, "2 c"] | None],
     params: dict[str, dict[str, Float[Array, " c"]]],
     nuisance: Nuisance,
     program: Program,
