@@ -56,7 +56,7 @@ def beside(
     now: Motion,
     steps: Float[Array, " w"],
     age: Float[Array, "2 c"] | None,
-) -> tuple[Motion, Float[Array, "wp #c"]]:
+) -> tuple[Motion, Float[Array, " wp #c"]]:
     """Reads at one step what other joints did; on straight lines between steps.
 
     Args:

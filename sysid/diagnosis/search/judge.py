@@ -36,9 +36,10 @@ from sysid.diagnosis.fits.candidate import (
 )
 from sysid.diagnosis.fits.intervals import standard_errors
 from sysid.diagnosis.fits.origins import at_nominal
-from sysid.diagnosis.fits.parameters import Slot, Space
+from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.space import SIGMA
+from sysid.diagnosis.fits.tolerances import within_tolerances
 from sysid.diagnosis.replay.band import EVERY, sample_rows
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.simulated.closed_loop import simulated
@@ -53,9 +54,10 @@ LEAST_FALL = 0.25
 
 What is significant need not matter: of a long record of a quiet encoder a servo's cycle
 is significant. Ours, read off 541 records with a cause, of six seeds of the wide
-battery, which are no evidence for it: below it are 9 of 16 false alarms, 5 of 35 wrong
-causes and 4 of 428 right ones. The share of the square above the noise of repeats does
-not separate them: false alarms remove 0.32 to 1.00 of it, right causes 0.28 to 1.00.
+battery, which are no evidence for it, and of errors that did not carry their weights:
+below it are 9 of 16 false alarms, 5 of 35 wrong causes and 4 of 428 right ones. The
+share of the square above the noise of repeats does not separate them: false alarms
+remove 0.32 to 1.00 of it, right causes 0.28 to 1.00.
 """
 
 LEFT = 2.0
@@ -184,7 +186,10 @@ class Judge:
         return self.errors[id(model)][1]
 
     def t_value(self, worse: Model, better: Model) -> float:
-        """T = d̄ √B / s_d of the block means d of e₀² − e₁² [1].
+        """T = d̄ √B / s_d of the block means d of w² (e₀² − e₁²) [1].
+
+        With the weights w of the likelihood: what a servo's cycle makes of an angle at
+        full speed speaks for no cause.
 
         Args:
             worse: the model of e₀.
@@ -207,7 +212,7 @@ class Judge:
         return float(np.mean(means)) / max(scatter, 1e-300)
 
     def fall(self, worse: Model, better: Model) -> float:
-        """1 − √(Σ e₁² / Σ e₀²), what goes of the error of held-out angles [1].
+        """1 − √(Σ w² e₁² / Σ w² e₀²), what goes of the error of held-out angles [1].
 
         Args:
             worse: the model of e₀.
@@ -220,8 +225,10 @@ class Judge:
         return 1.0 - float(np.sqrt(after / max(before, 1e-300)))
 
     def _squared(self, model: Model) -> Float[np.ndarray, "m p"]:
-        """Returns e², of a simulation that diverges no more than counts anyway."""
-        return np.minimum(self.error(model) ** 2, 1e12)
+        """Returns w² e², of what diverges no more than counts anyway [rad²]."""
+        output = self.output
+        weight = output.weight[1] if isinstance(output, OutputProblem) else 1.0
+        return weight**2 * np.minimum(self.error(model) ** 2, 1e12)
 
     def pair(self, smaller: Model, larger: Model) -> tuple[Model, Model]:
         """Returns what is compared: fits to the angle, the smaller within tolerances.
@@ -277,24 +284,3 @@ class Judge:
         if not self.problem.repeat:
             return bool(before > LEFT and after < LITTLE * before)
         return bool(before > LEFT > after and after - 1 < REMAINING * (before - 1))
-
-
-def within_tolerances(problem: Problem, model: Model) -> Model:
-    """Fits a model with its other parameters within their tolerances.
-
-    Args:
-        problem: to whose residuals.
-        model: where the fit begins.
-    """
-    slots = [_within(s, model.effects) for s in problem.space.slots]
-    bounded = replace(problem, space=Space(tuple(slots)))
-    return fit_models(bounded, [model.effects], [model.fit.theta], rounds=CONVERGED)[0]
-
-
-def _within(slot: Slot, effects: tuple[str, ...]) -> Slot:
-    """Keeps a nominal parameter within its tolerance."""
-    if slot.effect in effects or slot.prior_sd == 0.0:
-        return slot
-    reach = slot.prior_sd / SIGMA
-    low, high = slot.nominal - reach, slot.nominal + reach
-    return replace(slot, low=max(slot.low, low), high=min(slot.high, high))

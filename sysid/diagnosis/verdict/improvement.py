@@ -5,7 +5,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.fits.candidate import Model
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.search.judge import within_tolerances
+from sysid.diagnosis.fits.tolerances import within_tolerances
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.result import Gain

@@ -45,9 +45,9 @@ class Calibration:
     clean: float
 
 
-CALIBRATION = Calibration(0.82, 6.15, 4.07, 0.0, -4.65)
-"""Fitted by `benchmarks.diagnosis.calibration` to 487 joints of battery seeds 7041361
-and 2513600."""
+CALIBRATION = Calibration(0.67, 5.56, 4.20, 0.0, -4.43)
+"""Fitted by `benchmarks.diagnosis.calibration` to 783 joints of battery seeds 5635306,
+12592899 and 6491020."""
 
 
 def posterior(

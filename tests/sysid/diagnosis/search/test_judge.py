@@ -5,6 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from sysid.diagnosis.replay.band import EVERY
 from sysid.diagnosis.search import judge as module
 from sysid.diagnosis.search.judge import LEAST_FALL, LEVEL, Judge
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
@@ -143,3 +144,22 @@ def test_it_does_not_count_otherwise(changed):
     left = {"before": 381.0, "after": 0.5, **changed}
     sizes = {k: left.pop(k) for k in ("before", "after")}
     assert not says(Said(**{"gain": 1.4, "t": 7.4, **left}), **sizes)
+
+
+@pytest.mark.parametrize(("weight", "counts"), [(1.0, True), (0.03, False)])
+def test_an_angle_that_is_uncertain_in_motion_speaks_for_no_cause(
+    monkeypatch, weight, counts
+):
+    """A cycle of a fast servo: most of the error goes where it weighs little."""
+    monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
+    fast = np.arange(40) % 4 == 0
+    data = SimpleNamespace(valid=np.ones((40, 1), bool), dt=1.0)
+    problem = SimpleNamespace(data=data, known="both", block_s=4.0 * EVERY)
+    judge, left = Judge(problem, None), np.where(fast, 2.0, 1.05)[:, None]
+    weights = np.where(fast, weight, 1.0)[:, None]
+    judge.output = SimpleNamespace(weight=np.stack([np.ones_like(weights), weights]))
+    models = SimpleNamespace(), SimpleNamespace()
+    judge.errors[id(models[0])] = (models[0], np.where(fast[:, None], 9.0, 1.0))
+    judge.errors[id(models[1])] = (models[1], left)
+    assert (judge.fall(*models) > LEAST_FALL) is counts
+    assert bool(judge.t_value(*models) > LEVEL) is counts
