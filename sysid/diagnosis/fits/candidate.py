@@ -193,11 +193,20 @@ def task_of(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Ta
     low = np.array([s.low for s in space.slots])
     high = np.array([s.high for s in space.slots])
     wide = np.where(prior_sd > 0, prior_sd, 1.0)
-    many = np.array([s.many_optima for s in space.slots])
-    steps = np.where(many, 3e-4 * np.maximum(np.abs(start), 1e-6), 0.0)
+    steps = _own_steps(problem, start)
     # A limit that the smaller model does not reach has no slope there.
     fresh = tuple(space.of(effects[-1])) if effects else ()
     return Task(start, free, space.nominal, wide, low, high, steps, fresh)
+
+
+def _own_steps(problem: Problem, start: np.ndarray) -> np.ndarray:
+    """Returns the steps of differences of coordinates that need their own, else 0."""
+    slots = problem.space.slots
+    many = np.array([s.many_optima for s in slots])
+    times = np.array([s.kind == "linear" and s.unit == "s" for s in slots])
+    scale = np.array([s.scale for s in slots])
+    near = 3e-4 * np.maximum(np.abs(start), 1e-6)
+    return np.where(many, near, np.where(times, problem.time_step_s / scale, 0.0))
 
 
 def _scored(problem, sets, tasks, fits) -> list[Model]:

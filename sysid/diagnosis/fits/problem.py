@@ -42,6 +42,7 @@ class Problem:
     Attributes:
         channels: names of the two residuals.
         amplifies: whether a candidate may amplify the noise of the readings.
+        time_step_s: step of differences by a time; 0: as of any other coordinate [s].
         data: the joint's track.
         space: coordinates of the candidates.
         valid: where the two residuals count (2, m, p).
@@ -56,6 +57,7 @@ class Problem:
 
     channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
     amplifies: ClassVar[bool] = True
+    time_step_s: ClassVar[float] = 0.0
     data: JointTrack
     space: Space
     valid: Bool[np.ndarray, "2 m p"]

@@ -23,7 +23,7 @@ from sysid.diagnosis.likelihood.whitening import (
 )
 from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
-from sysid.diagnosis.simulated.closed_loop import Known, simulated
+from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
 
 FAR = 1e3
 """Largest error that counts, in units of the angle's size: of unstable candidates."""
@@ -41,6 +41,9 @@ class OutputProblem(Problem):
 
     channels: ClassVar[tuple[str, str]] = ("", "position")
     amplifies: ClassVar[bool] = False
+    # At its limit a servo does not see when within a substep a target came: the error
+    # is a staircase over delays, whose slope shows over a whole step of it.
+    time_step_s: ClassVar[float] = SUBSTEP_S
     equations: Problem | None = None
     stages: dict[tuple[str, ...], list] = field(default_factory=dict)
     seen: Known = field(default_factory=Known)

@@ -39,7 +39,9 @@ def record(rng):
         each = [swing(size, np.exp(log_mass)) for size, log_mass in thetas]
         return (read - np.stack(each)) / NOISE
 
-    return SimpleNamespace(space=Space(SLOTS), residual=residual, samples=400)
+    return SimpleNamespace(
+        space=Space(SLOTS), residual=residual, samples=400, time_step_s=0.0
+    )
 
 
 def fitted(problem: Any) -> Model:

@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
-from sysid.diagnosis.fits.candidate import fit_models, likelihood_gap
+from sysid.diagnosis.fits.candidate import fit_models, likelihood_gap, task_of
 from sysid.diagnosis.likelihood.whitening import Noise
+from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S
 from sysid.diagnosis.simulated.output_error import output_problem
 
 
@@ -70,6 +71,29 @@ def test_a_fit_to_the_angle_finds_a_delay_that_equations_only_guess():
     found = fit_models(output, [("transport_delay",)], [start])[0]
     delay_s = float(output.space.slots[index].value(found.fit.theta[index]))
     assert delay_s == pytest.approx(0.01, abs=2e-4)
+
+
+def at_its_limit(problem, late_s):
+    """Coordinates of a servo that a target makes push as hard as it can, later."""
+    theta = problem.space.nominal.copy()
+    limit, late = (problem.space.of(e)[0] for e in ("torque_limit", "transport_delay"))
+    theta[limit] = problem.space.slots[limit].coordinate(0.5)
+    theta[late] = late_s / problem.space.slots[late].scale
+    return theta
+
+
+def test_a_slope_over_a_delay_is_of_whole_steps_of_the_simulation():
+    """At its limit a servo does not see when within a substep a target came."""
+    output = output_problem(silent())
+    late, sizes = output.space.of("transport_delay")[0], []
+    for share in (0.05, 0.3, 0.55, 0.8):
+        start = at_its_limit(output, 0.01 + share * SUBSTEP_S)
+        ahead, step = start.copy(), task_of(output, ("transport_delay",), start).steps
+        ahead[late] += step[late]
+        before, after = output.residual(np.stack([start, ahead]))
+        sizes.append(np.linalg.norm(after - before) / max(step[late], 1e-12))
+    assert sizes == pytest.approx(np.mean(sizes) + np.zeros(4), rel=0.1)
+    assert sizes[0] > 0.1
 
 
 def candidate(score, tau=1.0, samples=100):
