@@ -21,7 +21,7 @@ from sysid.diagnosis.likelihood.whitening import (
     bulk_deviation,
     correlation_time,
 )
-from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
 
@@ -47,6 +47,11 @@ class OutputProblem(Problem):
     equations: Problem | None = None
     stages: dict[tuple[str, ...], list] = field(default_factory=dict)
     seen: Known = field(default_factory=Known)
+
+    @property
+    def reading_noise(self) -> float:
+        """Noise of the readings in an angle that is smoothed, s √(Σ_k w_k²) [rad]."""
+        return self.data.noise[0] * float(np.sqrt(np.sum(FINE_TAPS**2)))
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -102,8 +107,8 @@ class OutputProblem(Problem):
             found = self.repeat.differences(weight * raw[1], valid)
             noise = autoregressive(*found)
         else:
-            readings = np.array([self.data.noise[0] ** 2, 0.0, 0.0])
-            size = difference_noise(raw[1], valid, readings)
+            readings = np.array([self.reading_noise**2, 0.0, 0.0])
+            size = difference_noise(raw[1], valid, readings, band_steps=0.0)
             weight = 1.0 / np.hypot(1.0, unsure / size)
             noise = Noise(np.zeros(0), size)
         weights = np.stack([np.ones_like(weight), weight])
@@ -130,7 +135,7 @@ class OutputProblem(Problem):
         """
         r, valid = raw[1], self.valid[1]
         size = np.sqrt(correlation_time(r, valid) * np.mean(r[valid] ** 2))
-        known = Noise(np.zeros(0), max(float(size), self.data.noise[0], 1e-12))
+        known = Noise(np.zeros(0), max(float(size), self.reading_noise, 1e-12))
         return replace(self, noise=(self.noise[0], known))
 
 

@@ -9,6 +9,8 @@ from support.plain_servo import problem_with
 
 from sysid.diagnosis.fits.candidate import fit_models, likelihood_gap, task_of
 from sysid.diagnosis.likelihood.whitening import Noise
+from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
+from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S
 from sysid.diagnosis.simulated.output_error import output_problem
 
@@ -43,8 +45,23 @@ def test_what_an_error_leaves_is_noise_but_never_less_than_the_readings():
     assert output.with_remaining(3.0 * left).noise[1].deviation == pytest.approx(
         3.0, rel=0.5
     )
-    readings = output.data.noise[0]
-    assert output.with_remaining(0.0 * left).noise[1].deviation >= readings
+    least = output.with_remaining(0.0 * left).noise[1].deviation
+    assert least >= 0.5 * output.data.noise[0]
+
+
+def test_noise_without_repeats_is_that_of_the_smoothed_angle():
+    """Of readings of noise 1; the angle's error has passed no other band."""
+    output = output_problem(silent())
+    rows = sample_rows(len(output.data.track.cmd))
+    white = np.random.default_rng(0).normal(size=rows[-1] + 9)
+    noise = smoothed(white, SMOOTH_STEPS)[rows]
+    slow = 20.0 * np.sin(0.5 * np.arange(len(rows)) * 4 * output.data.dt)
+    raw = np.stack([0.0 * output.valid[1], (noise + slow)[:, None]])
+    found = output.with_noise(raw).noise[1].deviation
+    assert found == pytest.approx(float(np.std(noise)), rel=0.15)
+    read = replace(output, data=replace(output.data, noise=(1.0, 0.0)))
+    least = read.with_remaining(0.0 * raw).noise[1].deviation
+    assert least == pytest.approx(float(np.std(noise)), rel=0.15)
 
 
 def test_where_others_push_faster_than_is_sampled_the_angle_counts_less():
