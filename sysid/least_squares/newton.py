@@ -7,6 +7,12 @@ the others go on without it leaves the valley in which they were.
 import numpy as np
 from jaxtyping import Bool, Float
 
+MOST_CHANGES = 4
+"""Changes of the active set after which a step is taken as it is [coordinates]."""
+
+LEAST_GAIN = 1e-9
+"""Gain of a cost below which a coordinate stays at its bound [1]."""
+
 
 def normal_equations(
     jacobian: Float[np.ndarray, "r k"],
@@ -65,7 +71,7 @@ def bounded_step(
     low: Float[np.ndarray, " k"],
     high: Float[np.ndarray, " k"],
 ) -> Float[np.ndarray, " k"]:
-    """Δ with H_FF Δ_F = −g_F − H_FA Δ_A, where A are those that met a bound.
+    """Δ = argmin ½ Δᵀ H Δ + gᵀ Δ within low ≤ Δ ≤ high.
 
     Args:
         hessian: H [1].
@@ -74,22 +80,46 @@ def bounded_step(
         high: of the step, at least 0 [1].
 
     Returns:
-        The step; coordinates that would pass a bound end there, and the others (F) go
-        where they are best beside them.
+        The step; coordinates that meet a bound stop there, the others go where they are
+        best beside them, and one that would leave its bound again for that does.
 
     Source:
-        Active set: D. P. Bertsekas, Projected Newton Methods for Optimization Problems
-        with Simple Constraints, SIAM Journal on Control and Optimization 20(2), 1982.
+        Primal active set: J. Nocedal, S. J. Wright, Numerical Optimization, 2006,
+        section 16.5. Where coordinates compensate each other many pass their bounds
+        together at first, of which few are met at the end.
     """
     step, moves = np.zeros(len(slope)), np.ones(len(slope), bool)
-    while moves.any():
-        still = np.where(moves, 0.0, step)
-        step = still + solved(hessian, slope + hessian @ still, moves)
-        beyond = moves & ((step < low) | (step > high))
-        if not beyond.any():
+    for _ in range(MOST_CHANGES * len(slope)):
+        way = solved(hessian, slope + hessian @ step, moves)
+        share = _room(step, way, low, high)
+        if share.min(initial=1.0) < 1.0:
+            stops = int(np.argmin(share))
+            step = np.clip(step + share[stops] * way, low, high)
+            step[stops] = (high if way[stops] > 0.0 else low)[stops]
+            moves[stops] = False
+            continue
+        step = np.clip(step + way, low, high)
+        gain = _gain_of_leaving(hessian, slope + hessian @ step, step, low, high)
+        gain = np.where(moves, 0.0, gain)
+        if not gain.max(initial=0.0) > 0.0:
             break
-        step, moves = np.clip(step, low, high), moves & ~beyond
+        moves[np.argmax(gain)] = True
     return step
+
+
+def _room(step, way, low, high) -> Float[np.ndarray, " k"]:
+    """Returns the shares of a way after which coordinates meet their bounds."""
+    end = np.where(way > 0.0, high, low)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        share = np.where(way == 0.0, np.inf, (end - step) / way)
+    return np.maximum(share, 0.0)
+
+
+def _gain_of_leaving(hessian, slope, step, low, high) -> Float[np.ndarray, " k"]:
+    """Returns g² / H of coordinates whose slope leads off their bounds; else 0."""
+    away = ((slope < 0.0) & (step < high)) | ((slope > 0.0) & (step > low))
+    gain = slope**2 / np.maximum(np.diag(hessian), 1e-300)
+    return np.where(away & (gain > LEAST_GAIN), gain, 0.0)
 
 
 def solved(

@@ -39,6 +39,20 @@ def test_with_bounds_it_is_the_best_within_them(alike):
     assert left[0] < 0.95 * left[1]
 
 
+def test_coordinates_that_passed_their_bounds_together_leave_them_again():
+    """Twelve that nearly do four things: of those that first pass, few stay there."""
+    rng = np.random.default_rng(5)
+    shown = rng.normal(size=(60, 4)) @ rng.normal(size=(4, 12))
+    shown += 0.1 * rng.normal(size=shown.shape)
+    wanted, high = rng.normal(size=60), rng.uniform(0.01, 0.3, 12)
+    low = np.append(0.0, -high[1:])  # the first already stands at its bound
+    equations = normal_equations(shown, -wanted, np.zeros(12), np.full(12, 1e3))
+    step = bounded_step(*equations, low, high)
+    best = lsq_linear(shown, wanted, (low, high), method="bvls", tol=1e-13).x
+    assert step == pytest.approx(best, abs=1e-5)
+    assert 0.0 < np.mean((step > low) & (step < high)) < 1.0
+
+
 def test_a_coordinate_that_shows_nowhere_stays():
     shown = np.array([[1.0, 0.0], [1.0, 0.0]])
     equations = normal_equations(shown, np.ones(2), np.zeros(2), np.full(2, np.inf))
