@@ -12,6 +12,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
+from sysid.diagnosis.fits.clock import in_time
 from sysid.diagnosis.fits.origins import at_nominal, near_nominal, with_effects
 from sysid.diagnosis.fits.starts import best_starts, many_optima
 from sysid.diagnosis.simulated.output_error import OutputProblem
@@ -41,13 +42,13 @@ def settled_output(
     begin = at_nominal(output, equations), near_nominal(output, equations)
     starts = np.stack([*begin, fitted])
     raw = output.raw(starts, weigh=False)
-    nearest = raw[np.argmin(np.sum(raw**2, (1, 2, 3)))]
-    problem = output.with_noise(nearest)
+    nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
+    problem = output.with_noise(in_time(output, nearest))
     models = fit_models(
         problem, [effects] * len(starts), list(starts), rounds=CONVERGED
     )
     theta = min(models, key=lambda m: m.fit.cost).fit.theta
-    problem = output.with_noise(output.raw(theta[None], weigh=False)[0])
+    problem = output.with_noise(in_time(output, theta))
     return problem, fit_models(problem, [effects], [theta])[0]
 
 
