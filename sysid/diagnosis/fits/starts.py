@@ -23,7 +23,8 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     A start counts by the error that remains when the nuisance parameters follow it
     linearly. One that changes nothing, a limit that the record does not reach, comes
     last: it has no gradient. A parameter that is already far off its prior goes on from
-    there. Effects with many optima have none from nominal.
+    there. Effects with many optima have none from nominal. Where another valley of one
+    parameter lies behind a hill, it is one start more.
     """
     result: dict[str, list] = {name: [] for name in names}
     for name in names:
@@ -33,7 +34,7 @@ def starts_of(problem: Problem, model: Model, names: Sequence[str]) -> dict[str,
     smooth = [name for name in names if not many_optima(problem, name)]
     for origin, some, count in ((fitted, names, 2), (nominal, smooth, 1)):
         for name, best in best_starts(problem, model, origin, some, count).items():
-            result[name] += best
+            result[name] += best[::-1]  # the best of nominal stays the last
     return result
 
 
@@ -51,7 +52,11 @@ def best_starts(
         model: whose nuisance parameters follow linearly.
         origin: coordinates to which an effect is added [1].
         names: of the effects.
-        count: most starts of an effect.
+        count: most starts of an effect; one more if another valley lies behind a hill,
+            as play that a joint crosses freely lies behind play that it hardly notices.
+
+    Returns:
+        Starts of every effect, the best one first.
     """
     owned = [(n, t) for n in names for t in _tried(problem, model, origin, n)]
     if not owned:
@@ -63,9 +68,24 @@ def best_starts(
     for name in names:
         mine = [k for k, (owner, _) in enumerate(owned) if owner == name]
         few = count if len(mine) > 2 else 1
-        best = sorted(mine, key=lambda k: (idle[k], costs[k]))[:few]
+        ranked = sorted(mine, key=lambda k: (idle[k], costs[k]))
+        best = ranked[:few]
+        if len(problem.space.of(name)) == 1 and not many_optima(problem, name):
+            low = {mine[i] for i in valleys([costs[k] for k in mine])}
+            best += [k for k in ranked[few:] if k in low][:1]
         result[name] = [owned[k][1] for k in best]
     return result
+
+
+def valleys(costs: Sequence[float]) -> list[int]:
+    """Places that lie lower than both of their neighbours, the ends aside.
+
+    Examples:
+        >>> valleys([1.0, 2.0, 5.0, 3.0, 9.0])
+        [3]
+    """
+    inner = range(1, len(costs) - 1)
+    return [i for i in inner if costs[i] < min(costs[i - 1], costs[i + 1])]
 
 
 def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
