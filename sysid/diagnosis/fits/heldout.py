@@ -5,10 +5,16 @@
 by Gauss-Newton steps on all other folds with the slopes J of the common optimum, which
 is where they begin. The first step is all that most models need. Where parameters
 compensate each other along a curve, it leaves the curve, and a fold that nobody fitted
-would seem badly predicted although the others are too: steps go on from there.
+would seem badly predicted although the others are too: steps go on from there. And what
+turns back near the common optimum, as the cosine of an angle does, has next to no slope
+there and goes far, and from there no further step helps: it is damped,
+
+    θ̂_{−g} = θ̂ − (H_{−g} + λ I)⁻¹ (J_{−g}ᵀ r_{−g} + Σ⁻¹ (θ̂ − θ⁰))
+
+which holds what hardly shows, and leaves what shows well.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +26,10 @@ from sysid.least_squares.newton import bounded_step, normal_equations, solved
 
 STEPS = 4
 """Largest number of steps without a fold."""
+
+DAMPINGS = (1.0, 10.0, 100.0)
+"""λ of a step that raises the folds that were fitted if no further one leads back, in
+turn: one unit of a coordinate matters, and no slope is trusted that far [1]."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +57,9 @@ class _Part:
     def cost(self, theta: np.ndarray, residual: np.ndarray) -> float:
         return float(np.sum(residual[self.kept] ** 2)) + self.task.penalty(theta)
 
-    def moved(self, theta: np.ndarray, residual: np.ndarray) -> np.ndarray:
+    def moved(
+        self, theta: np.ndarray, residual: np.ndarray, damping: float = 0.0
+    ) -> np.ndarray:
         """Takes a step; that which all data would still ask for is not of the fold.
 
         What belongs to a record and not to the mechanism stays.
@@ -57,8 +69,8 @@ class _Part:
         common = self._quadratic(fit.theta, fit.residual, np.ones(len(self.kept), bool))
         rest = solved(*common, ~np.isin(k, fit.bounded))
         bounds = ((end - theta)[k] for end in (task.low, task.high))
-        moved = theta.copy()
-        moved[k] += bounded_step(hessian, slope + hessian @ rest, *bounds)
+        slope, moved = slope + hessian @ rest, theta.copy()
+        moved[k] += bounded_step(hessian + damping * np.eye(len(k)), slope, *bounds)
         moved[k] = np.clip(moved[k], task.low[k], task.high[k])
         moved[self.local] = fit.theta[self.local]
         return moved
@@ -86,7 +98,8 @@ def held_out(
     Source:
         Cross-validation: M. Stone, Cross-validatory choice and assessment of
         statistical predictions, 1974. Steps from the common optimum with its slopes
-        are ours (chord method).
+        are ours (chord method); damping: K. Levenberg, A Method for the Solution of
+        Certain Non-Linear Problems in Least Squares, 1944.
     """
     folds, count = problem.folds(), int(problem.fold.max()) + 1
     local = problem.space.local()
@@ -97,25 +110,47 @@ def held_out(
     ]
     thetas = np.stack([p.moved(p.fit.theta, p.fit.residual) for p in parts])
     residuals = problem.residual(thetas)
-    going = list(range(len(parts)))
+    now, lost = (thetas, residuals), []
+    going = _rising(parts, now, range(len(parts)))
     for _ in range(STEPS - 1):
-        going = [i for i in going if _rises(parts[i], thetas[i], residuals[i])]
-        if not going:
-            break
-        tried = np.stack([parts[i].moved(thetas[i], residuals[i]) for i in going])
-        found = problem.residual(tried)
-        nearer = [
-            n
-            for n, i in enumerate(going)
-            if parts[i].cost(tried[n], found[n])
-            < parts[i].cost(thetas[i], residuals[i])
-        ]
-        going = [going[n] for n in nearer]
-        thetas[going], residuals[going] = tried[nearer], found[nearer]
+        tried = [parts[i].moved(thetas[i], residuals[i]) for i in going]
+        nearer = _taken(problem, parts, now, going, tried)
+        lost += [i for i in going if i not in nearer]
+        going = _rising(parts, now, nearer)
+    for damping in DAMPINGS:
+        lost = _rising(parts, now, lost)
+        optima = [(parts[i], parts[i].fit) for i in lost]
+        tried = [part.moved(fit.theta, fit.residual, damping) for part, fit in optima]
+        _taken(problem, parts, now, lost, tried)
     return [
         _of_fit(thetas[i : i + count], residuals[i : i + count], folds)
         for i in range(0, len(parts), count)
     ]
+
+
+def _taken(
+    problem: Problem,
+    parts: list[_Part],
+    now: tuple[np.ndarray, np.ndarray],
+    going: list[int],
+    tried: list[np.ndarray],
+) -> list[int]:
+    """Puts what errs less on its folds in the place of where it is; returns which."""
+    if not going:
+        return []
+    thetas, residuals = now
+    nearer, found = [], problem.residual(np.stack(tried))
+    for i, theta, residual in zip(going, tried, found, strict=True):
+        if parts[i].cost(theta, residual) < parts[i].cost(thetas[i], residuals[i]):
+            thetas[i], residuals[i] = theta, residual
+            nearer.append(i)
+    return nearer
+
+
+def _rising(
+    parts: list[_Part], now: tuple[np.ndarray, np.ndarray], which: Iterable[int]
+) -> list[int]:
+    return [i for i in which if _rises(parts[i], now[0][i], now[1][i])]
 
 
 def _rises(part: _Part, theta: np.ndarray, residual: np.ndarray) -> bool:

@@ -117,3 +117,34 @@ def test_what_meets_a_bound_takes_its_partner_along():
         (held,) = held_out(problem, [task], [fit])
         inside = float(fit.residual @ fit.residual)
         assert held.error < 1.5 * inside
+
+
+def turned(thetas):
+    """One coordinate shows by itself, and of another the cosine alone."""
+    a, c = np.asarray(thetas).T
+    rng = np.random.default_rng(3)
+    noise, slant = rng.normal(size=60), 1.0 + 0.05 * rng.normal(size=60)
+    other = 100.0 * (np.cos(c) - 1.0)[:, None] * rng.normal(size=60)
+    return 300.0 * (a - 1.0)[:, None] * slant + other + noise
+
+
+def test_what_turns_back_at_the_optimum_goes_no_further_than_it_helps():
+    """A slope of nearly nothing there would take it far from the other folds."""
+    folds = np.arange(60) % 3
+    problem = SimpleNamespace(
+        folds=lambda: folds,
+        fold=folds,
+        residual=turned,
+        space=SimpleNamespace(local=lambda: []),
+    )
+    wide = np.full(2, 5.0)
+    task = replace(
+        TASK,
+        start=np.zeros(2),
+        center=np.zeros(2),
+        deviation=wide,
+        low=-np.full(2, 9.0),
+    )
+    (fit,) = fit_all(turned, [task], rounds=20)
+    (held,) = held_out(problem, [task], [fit])
+    assert held.error < 1.1 * float(fit.residual @ fit.residual)
