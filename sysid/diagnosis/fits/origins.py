@@ -63,6 +63,30 @@ def begun_anew(problem: Problem, model: Model) -> Model:
     return min(model, again, key=lambda m: m.fit.cost)
 
 
+def put_back(problem: Problem, model: Model, most_sd: float) -> Float[np.ndarray, " n"]:
+    """Coordinates of a fit with what is far off its prior at its nominal value.
+
+    θ_i = θ⁰_i where |θ̂_i − θ⁰_i| > s σ_i, of no effect of the model, else θ̂_i.
+
+    Args:
+        problem: residuals of a joint.
+        model: a fitted model.
+        most_sd: s, prior standard deviations that stay [1].
+
+    Returns:
+        Coordinates, in units of their scales [1].
+
+    Source:
+        Ours: a parameter that leaves its tolerance may stand for an effect.
+    """
+    theta = model.fit.theta.copy()
+    for i, slot in enumerate(problem.space.slots):
+        known = 0.0 < slot.prior_sd < np.inf and slot.effect not in model.effects
+        if known and slot.shift(theta[i]) > most_sd:
+            theta[i] = slot.nominal
+    return theta
+
+
 def _free(problem: Problem) -> np.ndarray:
     """Which parameters have no nominal value."""
     return np.isinf([slot.prior_sd for slot in problem.space.slots])

@@ -4,7 +4,8 @@ In closed loop the error of the angle has many optima: a servo whose stiffness i
 rings at another frequency, and a fit of the angle stays where it began. The equations
 have one optimum and are near the truth, but less exact. And where an error is large,
 priors count for nothing: what others can take up of it they do, unless the effect is
-fitted alone at first.
+fitted alone at first. What has left its tolerance in the smaller model may stand for
+the effect: beside it the effect does nothing, or does it twice.
 """
 
 import numpy as np
@@ -13,16 +14,21 @@ from jaxtyping import Float
 from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
 from sysid.diagnosis.fits.clock import in_time
-from sysid.diagnosis.fits.origins import at_nominal, near_nominal, with_effects
-from sysid.diagnosis.fits.starts import best_starts, many_optima
+from sysid.diagnosis.fits.origins import (
+    at_nominal,
+    near_nominal,
+    put_back,
+    with_effects,
+)
+from sysid.diagnosis.fits.starts import FAR_SD, best_starts, many_optima
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""
 
 ALONE_TRIED = 3
-"""The same of those that come nearest to it when they are fitted alone, at nominal and
-in the smaller model, each."""
+"""The same of those that come nearest to it when they are fitted alone: at nominal, in
+the smaller model, and there with what has left its tolerance put back, each."""
 
 
 def settled_output(
@@ -64,7 +70,8 @@ def output_starts(
     there, those that do in the smaller model, and some that the equations prefer. Where
     a nominal parameter of the smaller model stands for an effect, as the servo's
     damping for viscous friction, all effects come alike near there; at nominal they do
-    not.
+    not. But there the gains' own tolerances may matter more than any effect, so those
+    begin too that come nearest where it alone is put back.
 
     Args:
         problem: the error of the angle.
@@ -73,7 +80,7 @@ def output_starts(
     """
     sets = [m.effects for m in proposed]
     begin = [at_nominal(problem, m) for m in proposed]
-    beside = _beside(problem, smaller, proposed)
+    beside = _beside(problem, smaller, proposed, smaller.fit.theta)
     fits = fitted_alone(problem, [*sets, *sets], [*begin, *beside])
     alone, added = fits[: len(sets)], fits[len(sets) :]
     fitted = [m.fit.theta for m in proposed]
@@ -83,19 +90,36 @@ def output_starts(
     for thetas in (alone, added):
         ranked = np.argsort(costs(problem, sets, thetas))
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
-    return [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
+    starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
+    return starts + _with_others_back(problem, smaller, proposed)
+
+
+def _with_others_back(
+    problem: OutputProblem, smaller: Model, proposed: list[Model]
+) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
+    """Returns those that come nearest where what has left its tolerance is put back."""
+    origin = put_back(problem, smaller, FAR_SD)
+    if np.array_equal(origin, smaller.fit.theta):
+        return []
+    sets = [m.effects for m in proposed]
+    fits = fitted_alone(problem, sets, _beside(problem, smaller, proposed, origin))
+    ranked = np.argsort(costs(problem, sets, fits))[:ALONE_TRIED]
+    return [(sets[k], fits[k]) for k in ranked.tolist()]
 
 
 def _beside(
-    problem: OutputProblem, smaller: Model, proposed: list[Model]
+    problem: OutputProblem,
+    smaller: Model,
+    proposed: list[Model],
+    origin: Float[np.ndarray, " n"],
 ) -> list[Float[np.ndarray, " n"]]:
-    """Returns the smaller model with the last effect of every larger one.
+    """Returns an origin, each time with the last effect of another larger model.
 
     Its size is that of the equations, or one of the effect's own starts if the angle is
     nearer with it; equations may be wrong by so much that a limit is not met, or is one
     of the other direction, and from there no slope leads back.
     """
-    names, origin = [m.effects[-1] for m in proposed], smaller.fit.theta
+    names = [m.effects[-1] for m in proposed]
     smooth = [name for name in names if not many_optima(problem, name)]
     own = best_starts(problem, smaller, origin, smooth)
     said = [with_effects(problem, origin, m, m.effects[-1:]) for m in proposed]

@@ -86,3 +86,21 @@ def test_what_comes_near_alone_is_tried_whatever_the_equations_say(unknown):
     assert tried[:EQUATIONS_TRIED] == sets[:EQUATIONS_TRIED]
     assert ("stiffness",) in tried  # three times too stiff
     assert len(tried) <= EQUATIONS_TRIED + ALONE_TRIED < len(sets)
+
+
+def test_what_left_its_tolerance_may_stand_for_the_effect_and_is_put_back(unknown):
+    """Beside it, a candidate does nothing, or twice what it should."""
+    problem, base = settled_output(*unknown)
+    slots = problem.space.slots
+    mass = [slot.label for slot in slots].index("mass")
+    index = problem.space.of("acceleration_limit")[0]
+    strained = base.fit.theta.copy()
+    strained[mass] = 5.0 * slots[mass].prior_sd
+    (base,) = fit_models(problem, [()], [strained], rounds=0)
+    said = np.where(np.arange(len(slots)) == index, 1.0, strained)
+    proposed = fit_models(problem, [("acceleration_limit",)], [said], rounds=0)
+    effects, back = output_starts(problem, base, proposed)[-1]
+    assert effects == ("acceleration_limit",)
+    assert back[mass] == slots[mass].nominal
+    others = ~np.isin(np.arange(len(slots)), [mass, index])
+    np.testing.assert_array_equal(back[others], strained[others])
