@@ -13,10 +13,10 @@ its blocks,
 
 must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
 parameter that leaves its tolerance. And it must matter: the root mean square of the
-error must fall by the share `LEAST_FALL`, or, where repeats show its noise, from
-clearly more to about that. Gains of a servo that nobody knows are, with and without the
-effect, those that the logged effort shows to that model, as surely as it does: free
-ones would do in the simulation what the effect does. The likelihood need not gain where
+error must fall by the share `LEAST_FALL`, or from clearly more than noise to about
+that. Gains of a servo that nobody knows are, with and without the effect, those that
+the logged effort shows to that model, as surely as it does: free ones would do in the
+simulation what the effect does. The likelihood need not gain where
 repeats show that the logged effort has no other explanation: what parameters a little
 out of their tolerances hide of the angle, as a servo's damping hides friction, they do
 not hide of the effort, whose error then must fall by that share.
@@ -245,17 +245,18 @@ class Judge:
         return self.prefers(smaller, larger) and self._matters(smaller, larger)
 
     def _matters(self, smaller: Model, larger: Model) -> bool:
-        """Whether much goes of the angle's error or of an explained effort's.
+        """Whether much goes of an error of angle or explained effort, or all but noise.
 
-        Or all of the angle's that is more than noise.
+        Noise is of repeats, or what neighbouring readings of the angle do not share: by
+        the same noise the verdict would be that something is unexplained.
         """
         worse, better = self.pair(smaller, larger)
         left = (larger.errors.max() / smaller.errors.max()) ** 0.5
         explained = self._explains(smaller, larger) and 1.0 - left > LEAST_FALL
         if explained or self.fall(worse, better) > LEAST_FALL:
             return True
-        before, after = worse.errors.max(), better.errors.max()
-        return bool(self.problem.repeat and before > LEFT > after)
+        known = self.problem.repeat or isinstance(self.output, OutputProblem)
+        return bool(known and worse.errors.max() > LEFT > better.errors.max())
 
     def prefers(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better than the smaller one."""

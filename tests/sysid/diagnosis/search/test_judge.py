@@ -106,6 +106,15 @@ def test_an_error_that_becomes_all_but_noise_matters(angle, repeat, matters):
     assert says(judge) == matters
 
 
+@pytest.mark.parametrize(("left", "matters"), [(1.9, True), (2.1, False)])
+def test_the_noise_of_an_encoder_is_known_without_repeats(monkeypatch, left, matters):
+    """Coarse targets: 2.8 times it is `unexplained`, and the grid leaves 1.9."""
+    monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
+    judge = Said(ENOUGH, 4.5, repeat=False, fall=0.16)
+    judge.angle = (2.8, left)
+    assert says(judge) == matters
+
+
 def test_effort_without_another_explanation_counts_where_the_angle_hides_it():
     """Friction that a servo's damping hides: 381 times the noise becomes none."""
     assert says(Said(1.4, 7.4), before=381.0, after=0.5)
