@@ -37,7 +37,7 @@ class _Line:
     sigma: float
 
 
-def in_time(
+def without_drift(
     problem: Problem, theta: Float[np.ndarray, " n"]
 ) -> Float[np.ndarray, "2 m p"]:
     """Residuals r(θ, d̂) with the drift d̂ = argmin Σ ((r − r') / σ)² of the repeats.

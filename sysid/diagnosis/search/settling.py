@@ -3,7 +3,7 @@
 import numpy as np
 
 from sysid.diagnosis.fits.candidate import Model, fit_models
-from sysid.diagnosis.fits.clock import in_time
+from sysid.diagnosis.fits.clock import without_drift
 from sysid.diagnosis.fits.origins import begun_anew
 from sysid.diagnosis.fits.problem import Problem
 
@@ -12,7 +12,7 @@ def settled(problem: Problem) -> tuple[Problem, Model]:
     """Fits the nuisance parameters and estimates the noise, in turns."""
     theta = problem.space.nominal
     for _ in range(3):
-        problem = problem.with_noise(in_time(problem, theta))
+        problem = problem.with_noise(without_drift(problem, theta))
         model = begun_anew(problem, refitted(problem, (), theta))
         theta = model.fit.theta
     return problem, model

@@ -13,7 +13,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
 from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
-from sysid.diagnosis.fits.clock import in_time
+from sysid.diagnosis.fits.clock import without_drift
 from sysid.diagnosis.fits.origins import (
     at_nominal,
     near_nominal,
@@ -49,12 +49,12 @@ def settled_output(
     starts = np.stack([*begin, fitted])
     raw = output.raw(starts, weigh=False)
     nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
-    problem = output.with_noise(in_time(output, nearest))
+    problem = output.with_noise(without_drift(output, nearest))
     models = fit_models(
         problem, [effects] * len(starts), list(starts), rounds=CONVERGED
     )
     theta = min(models, key=lambda m: m.fit.cost).fit.theta
-    problem = output.with_noise(in_time(output, theta))
+    problem = output.with_noise(without_drift(output, theta))
     return problem, fit_models(problem, [effects], [theta])[0]
 
 

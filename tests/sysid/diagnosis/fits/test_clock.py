@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from sysid.diagnosis.fits.clock import in_time
+from sysid.diagnosis.fits.clock import without_drift
 
 DT, PERIOD, RUNS, NOISE = 0.02, 400, 3, 2e-4
 PPM = 40.0
@@ -58,7 +58,9 @@ def test_repeats_that_a_clock_reads_late_differ_by_noise(bend):
     problem, nominal = repeated(PPM, bend), np.zeros(2)
     plain = problem.raw(nominal[None])[0]
     assert scatter(problem, plain) > 1.5 * NOISE
-    assert scatter(problem, in_time(problem, nominal)) == pytest.approx(NOISE, rel=0.05)
+    assert scatter(problem, without_drift(problem, nominal)) == pytest.approx(
+        NOISE, rel=0.05
+    )
     assert np.all(nominal == 0.0)
 
 
@@ -66,10 +68,10 @@ def test_repeats_in_time_stay_as_they_are():
     for seed in range(5):
         problem, nominal = repeated(0.0, seed=seed), np.zeros(2)
         plain = problem.raw(nominal[None])[0]
-        assert np.all(in_time(problem, nominal) == plain)
+        assert np.all(without_drift(problem, nominal) == plain)
 
 
 def test_where_nothing_repeats_nothing_is_tried():
     problem, nominal = repeated(PPM), np.zeros(2)
     problem.repeat = False
-    assert np.all(in_time(problem, nominal) == problem.raw(nominal[None])[0])
+    assert np.all(without_drift(problem, nominal) == problem.raw(nominal[None])[0])
