@@ -44,8 +44,10 @@ def add(actions) -> None:
 
 def run(args: argparse.Namespace) -> int:
     """Names what the simulation lacks; writes verdict, hand file and report."""
+    from fingers_mjx.training.compile_cache import use_compile_cache
     from sysid.diagnosis.diagnose import examine
 
+    use_compile_cache()
     mechanism, logs = records.mechanism_of(args), args.records
     if _walks(logs):
         hand = _without_effects(mechanism.hand, args, logs)

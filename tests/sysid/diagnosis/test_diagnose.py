@@ -8,6 +8,7 @@ import json
 import random
 import re
 
+import jax
 import numpy as np
 import pytest
 
@@ -20,6 +21,7 @@ from benchmarks.diagnosis.hidden.stands import make_stand
 from benchmarks.diagnosis.hidden.truth import OUTSIDE, Mechanism
 from envs.hand.hand_file import load_hand_file
 from fingers_mjx.cli.main import main
+from fingers_mjx.training.compile_cache import SWITCH
 from sysid.diagnosis.diagnose import diagnose
 from sysid.drive import Nominal
 from sysid.logs.log import MeasuredLog, make_log
@@ -139,7 +141,16 @@ def test_the_verdict_moves_with_the_joint():
         ]
 
 
-def test_files_of_a_diagnosis(tmp_path, capsys):
+@pytest.fixture
+def cache(tmp_path, monkeypatch):
+    """A place of its own for compiled programs."""
+    before = jax.config.jax_compilation_cache_dir  # pyright: ignore
+    monkeypatch.setenv(SWITCH, str(tmp_path / "compiled"))
+    yield str(tmp_path / "compiled")
+    jax.config.update("jax_compilation_cache_dir", before)
+
+
+def test_files_of_a_diagnosis(tmp_path, capsys, cache):
     """Verdict, report and a hand file that loads; the same verdict again."""
     case = draw_case(23, ("stiffness",), "strong", "joint", round_s=6.0, lowpass_hz=3.0)
     write_log(case.logs[0], tmp_path / "finger.csv")
@@ -147,6 +158,8 @@ def test_files_of_a_diagnosis(tmp_path, capsys):
         words = ["sysid", "diagnose", str(tmp_path / "finger.csv")]
         assert main([*words, "-o", str(tmp_path / out)]) == 0
     assert "stiffness" in capsys.readouterr().out
+    # What is compiled for a record the next diagnosis of it need not compile.
+    assert jax.config.jax_compilation_cache_dir == cache  # pyright: ignore
     said, again = (
         json.loads((tmp_path / out / "diagnosis.json").read_text())
         for out in ("one", "two")
