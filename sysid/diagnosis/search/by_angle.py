@@ -56,8 +56,8 @@ def unsolved(
     output = judge.output
     if output is judge.problem or not isinstance(output, OutputProblem):
         return None
-    if not output.repeat:  # only they show what is noise
-        return None
+    # Without repeats its noise is what neighbouring readings do not share, by which
+    # the verdict without this search would be that something is unexplained.
     before, after = nearest(judge, base), nearest(judge, best)
     if not leaves_much(before.errors[1], after.errors[1]):
         return None

@@ -112,6 +112,8 @@ def search(problem: Problem) -> Search:
     strained = base.penalty > STRAINED
     if problem.repeat or not (found.best.effects or strained):
         return found
+    if found.problem is not problem:  # the angle decided, and does so again
+        problem, base = found.problem, found.base
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
     return _searched(problem, base)

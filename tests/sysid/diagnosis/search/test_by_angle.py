@@ -34,7 +34,8 @@ def test_much_is_more_than_noise_and_than_what_a_model_errs_by():
     ("base", "best", "repeat", "searched"),
     [
         (6.2, 6.2, True, True),
-        (6.2, 6.2, False, False),  # what is left may be noise
+        (6.2, 6.2, False, True),  # noise is what neighbouring readings do not share
+        (1.6, 1.6, False, False),
         (1.6, 1.6, True, False),
         (9.0, 1.1, True, False),
     ],

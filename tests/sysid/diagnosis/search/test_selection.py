@@ -100,9 +100,10 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     """Without repeats, with what the first run left as noise."""
     fit = SimpleNamespace(theta=np.zeros(1))
     base = SimpleNamespace(penalty=penalty, fit=fit)
-    found = SimpleNamespace(best=SimpleNamespace(effects=effects, fit=fit))
+    best = SimpleNamespace(effects=effects, fit=fit)
     problem = SimpleNamespace(repeat=repeat, raw=lambda theta: [np.full(2, 3.0)])
     problem.with_remaining = lambda left: SimpleNamespace(left=left)
+    found = SimpleNamespace(best=best, base=base, problem=problem)
     seen = []
 
     def searched(problem, base):
@@ -119,6 +120,11 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
+    left = SimpleNamespace(raw=lambda theta: [np.full(2, 5.0)])
+    left.with_remaining = problem.with_remaining
+    found.problem = left  # the angle was searched, and is searched again
+    search(problem)
+    assert runs == 1 or seen[-1].left.tolist() == [5.0, 5.0]
 
 
 def test_a_model_that_was_left_behind_is_fitted_from_where_the_smaller_one_is():
