@@ -249,10 +249,15 @@ def _constants(one: _Joint, logged: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _large_torque(one: _Joint, logged: np.ndarray) -> float:
-    """The torque that 2 % of the samples exceed; the servo's where none is logged."""
+    """The torque that 2 % of the samples exceed; the servo's where none is logged.
+
+    The servo's is within its limit: it asks for many times that on the way to a target
+    that is far away.
+    """
     kp, j = one.drive.kp.value, one.j
+    most = one.drive.parameter("torque_limit", "limit_nm", np.inf)
     torque = np.concatenate(
-        [e if ok else kp * f * (p.cmd[:, j] - p.pos[:, j])
+        [e if ok else np.clip(kp * f * (p.cmd[:, j] - p.pos[:, j]), -most, most)
          for e, ok, p, f in zip(one.efforts(), logged, one.pieces, one.gain_factors(),
                                 strict=True)]
     )  # fmt: skip
