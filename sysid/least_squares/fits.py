@@ -87,6 +87,14 @@ class Fit:
 STEP = 1e-2
 """Step of the differences, in units of the coordinate or of its prior deviation."""
 
+TOO_LONG = 2.0
+"""Norm of what a difference changes, in units of that of the residual or its noise,
+beyond which it is no slope: where a joint swings at its limit much follows from little,
+and a hundredth of a unit may be many times the friction that there is [1]."""
+
+RETAKEN = 3
+"""How often a difference that is too long is taken again, shorter, at most."""
+
 LONGEST = 2.0
 """Longest step of a coordinate [1]."""
 
@@ -203,13 +211,23 @@ class _State:
         self.r = r
         self.cost = float(r @ r) + self.task.penalty(self.theta)
 
+    def given(self, index: int) -> float:
+        """Step that the task gives a coordinate; 0 where it gives none."""
+        return 0.0 if self.task.steps is None else float(self.task.steps[index])
+
     def steps(self, index: int) -> float:
         deviation = self.task.deviation[index]
-        step = STEP * min(1.0, max(deviation, 0.02) * 5.0)
-        if self.task.steps is not None and self.task.steps[index] > 0.0:
-            step = float(self.task.steps[index])
+        step = self.given(index) or STEP * min(1.0, max(deviation, 0.02) * 5.0)
+        step = min(step, self.longest(index))
         above = self.theta[index] + step > self.task.high[index]
         return -step if above else step
+
+    def longest(self, index: int) -> float:
+        """Step that changes the residual by all that is left of it, or by noise."""
+        slope = float(np.linalg.norm(self.columns.get(index, 0.0)))
+        if self.given(index) or not 0.0 < slope < np.inf:
+            return np.inf
+        return max(float(np.linalg.norm(self.r)), len(self.r) ** 0.5) / slope
 
     def proposals(self) -> list[np.ndarray]:
         task, k = self.task, self.task.free
@@ -249,28 +267,41 @@ class _State:
 
 def _derive(residual: Residual, live: list[_State], shared: dict) -> None:
     """Finds Jacobians by forward or central differences where fits have moved since."""
-    rows, places = [], []
+    places = []
     for state in live:
-        for i in state.task.free:
-            if i in state.own:
-                continue
+        for i in (i for i in state.task.free if i not in state.own):
             if i in shared and i not in state.task.fresh:
                 state.columns[i] = shared[i]
                 continue
-            step = state.steps(i)
-            for away in (step, -step) if state.task.central else (step,):
-                theta = state.theta.copy()
-                theta[i] += away
-                rows.append(theta)
-            places.append((state, i, step))
             state.own.add(i)
+            places.append((state, i, state.steps(i)))
+    for _ in range(1 + RETAKEN):
+        _difference(residual, places)
+        places = [
+            (state, i, state.steps(i))
+            for state, i, step in places
+            if abs(step) > TOO_LONG * state.longest(i)
+        ]
+
+
+def _difference(residual: Residual, places: list[tuple[_State, int, float]]) -> None:
+    """Takes differences of states by coordinates, with steps."""
+    rows = []
+    for state, i, step in places:
+        for away in (step, -step) if state.task.central else (step,):
+            theta = state.theta.copy()
+            theta[i] += away
+            rows.append(theta)
     found = iter(residual(np.stack(rows)) if rows else ())
     for state, i, step in places:
         ahead = next(found)
         if state.task.central:
-            state.columns[i] = (ahead - next(found)) / (2.0 * step)
+            column = (ahead - next(found)) / (2.0 * step)
         else:
-            state.columns[i] = (ahead - state.r) / step
+            column = (ahead - state.r) / step
+        # Beside a simulation that diverges nothing is known of a slope.
+        known = bool(np.all(np.isfinite(column)))
+        state.columns[i] = column if known else np.zeros_like(column)
 
 
 def _advance(residual: Residual, live: list[_State]) -> None:

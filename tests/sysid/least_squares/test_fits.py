@@ -79,6 +79,36 @@ def test_curved():
         assert fit.theta[:2] == pytest.approx([2.0, 1.5], abs=1e-2)
 
 
+def test_differences_are_short_where_much_follows_from_little():
+    """Of a swing whose rate is off the phase grows: (d/dx) sin(t x) is t cos(t x).
+
+    A hundredth turns it by up to four, and is not the way to the three thousandths
+    that are searched.
+    """
+    t = np.linspace(0.0, 400.0, 200)
+
+    def residual(thetas):
+        return 20.0 * (np.sin(t * (1.0 + thetas[:, :1])) - np.sin(1.003 * t))
+
+    (fit,) = fit_all(residual, [task([0, 0, 0], free=(0,))], rounds=10)
+    assert fit.theta[0] == pytest.approx(0.003, abs=1e-5)
+    exact = 20.0 * t * np.cos(1.003 * t)
+    assert fit.jacobian[:, 0] == pytest.approx(exact, abs=0.1 * np.abs(exact).max())
+
+
+def test_a_coordinate_that_diverges_at_once_lets_the_others_move():
+    """Beside it one that moves nothing made the normal equations singular."""
+
+    def residual(thetas):
+        gone = np.where(thetas[:, :1] > 0.0, np.inf, 0.0)
+        with np.errstate(invalid="ignore"):
+            return gone + thetas[:, 2:] * A[:, 2] - Y
+
+    (fit,) = fit_all(residual, [task([0, 0, 0], deviation=np.inf)], rounds=10)
+    assert fit.theta[0] == 0.0
+    assert fit.theta[2] == pytest.approx(A[:, 2] @ Y / (A[:, 2] @ A[:, 2]), abs=1e-4)
+
+
 def test_central_differences_are_exact_for_a_parabola():
     """Forward differences of t² at 0 with step h are h; central ones are 0."""
 
