@@ -202,7 +202,7 @@ def _linear(effect: str, name: str, parameter: Parameter, size: float | None) ->
         scale = prior.spread if prior.kind == "normal" else prior.center
     signed = parameter.low < 0.0
     grid = _GRIDS.get(parameter.unit, (0.1,)) if size is not None else (0.5,)
-    starts = (0.1, -0.1) if signed else grid
+    starts = (0.1, 0.01, -0.01, -0.1) if signed else grid
     low = -30.0 if signed else 0.0
     return Slot(effect, name, parameter.unit, "linear", scale, 0.0, low, 30.0, 0.0,
                 starts, True)  # fmt: skip

@@ -27,6 +27,14 @@ def test_some_start_is_near_every_torque_that_a_slow_low_pass_leaves():
         assert np.abs(np.log(starts / limit)).min() < 0.3
 
 
+def test_sizes_that_may_have_either_sign_begin_small_too():
+    """Where a joint swings at its limit a tenth of all torques is no start."""
+    space = problem_with().space
+    for i in space.of("asymmetric_viscous"):
+        starts = np.array(space.slots[i].starts)
+        assert sorted(starts[np.abs(starts) < 0.05]) == [-0.01, 0.01]
+
+
 @pytest.mark.parametrize(
     "effect", ["encoder_scale", "stiffness", "encoder_eccentricity"]
 )
