@@ -128,6 +128,21 @@ def held_out(
     ]
 
 
+def predicted(
+    problem: Problem, thetas: Float[np.ndarray, "g n"]
+) -> Float[np.ndarray, " r"]:
+    """Whitened residuals ε_i(θ̂_{−g(i)}) of what a model predicts of each fold [1].
+
+    Args:
+        problem: residuals of a joint.
+        thetas: coordinates θ̂_{−g} without each fold g [1].
+
+    Source:
+        Ours; `held_out`.
+    """
+    return _unseen(problem.residual(thetas), problem.folds())
+
+
 def _taken(
     problem: Problem,
     parts: list[_Part],
@@ -165,6 +180,9 @@ def _rises(part: _Part, theta: np.ndarray, residual: np.ndarray) -> bool:
 
 
 def _of_fit(thetas: np.ndarray, residuals: np.ndarray, folds: np.ndarray) -> HeldOut:
-    seen = folds[None] == np.arange(len(thetas))[:, None]
-    error = float(np.sum(np.where(seen, residuals, 0.0) ** 2))
-    return HeldOut(thetas, error)
+    return HeldOut(thetas, float(np.sum(_unseen(residuals, folds) ** 2)))
+
+
+def _unseen(residuals: np.ndarray, folds: np.ndarray) -> np.ndarray:
+    """Returns of every residual that of the parameters without its fold."""
+    return np.take_along_axis(residuals, folds[None], 0)[0]

@@ -11,11 +11,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sysid.diagnosis.fits.candidate import (
+    CONVERGED,
     Model,
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
 )
+from sysid.diagnosis.fits.heldout import predicted
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.likelihood.folds import shorter_blocks
 from sysid.diagnosis.replay.motion import JointTrack
@@ -38,6 +40,9 @@ MOST = 3
 
 EXCESS = 1.5
 """Mean squared whitened residual above which something may be unexplained."""
+
+MOST_SQUARE = 1e12
+"""Squared whitened residual that stands for what diverges [1]."""
 
 STRAINED = 25.0
 """Squared prior deviations of the nuisance parameters that are no accident [1]."""
@@ -116,7 +121,22 @@ def search(problem: Problem) -> Search:
         problem, base = found.problem, found.base
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
-    return _searched(problem, base)
+    return _with_first(_searched(problem, base), found.best)
+
+
+def _with_first(again: Search, first: Model) -> Search:
+    """Goes on from the first answer where a second search has lost it.
+
+    Its starts are those of another noise, and may end in a valley beside it.
+    """
+    problem, base, best = again.problem, again.base, again.best
+    if set(first.effects) <= set(best.effects):
+        return again
+    effects, theta = [first.effects], [first.fit.theta]
+    kept = fit_models(problem, effects, theta, rounds=CONVERGED)[0]
+    if not accepted(problem, best, kept, base):
+        return again
+    return _searched(problem, base, kept)
 
 
 def _by_angle(found: Search) -> Search:
@@ -130,21 +150,31 @@ def _by_angle(found: Search) -> Search:
 
 
 def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
-    """Holds out parts of a moment that alone has nearly all of the nominal error."""
-    if problem.whole or base.errors.max() < EXCESS:
+    """Holds out parts of a moment that alone has nearly all of the nominal error.
+
+    Nominal parameters far off their priors may fit that moment; then nearly all of the
+    error is in what the others predict of it.
+    """
+    if problem.whole:
         return problem, base
-    excess = (base.fit.residual**2 - problem.counts()).reshape(2, *problem.fold.shape)
-    blocks = problem.data, problem.repeat, problem.fold, excess.sum(0)
-    fold, block_s = shorter_blocks(*blocks)
-    if np.array_equal(fold, problem.fold):
-        return problem, base
-    problem = replace(problem, fold=fold, block_s=block_s)
-    return problem, fit_models(problem, [()], [base.fit.theta])[0]
+    counted, shape = problem.counts(), (2, *problem.fold.shape)
+    for error in (base.fit.residual, predicted(problem, base.fold_theta)):
+        squares = np.minimum(np.nan_to_num(error**2, nan=np.inf), MOST_SQUARE)
+        sums = squares.reshape(2, -1).sum(1)
+        if np.all(sums <= EXCESS * problem.channel_counts()):
+            continue
+        excess = (squares - counted).reshape(shape).sum(0)
+        parts = problem.data, problem.repeat, problem.fold, excess
+        fold, block_s = shorter_blocks(*parts)
+        if not np.array_equal(fold, problem.fold):
+            problem = replace(problem, fold=fold, block_s=block_s)
+            return problem, fit_models(problem, [()], [base.fit.theta])[0]
+    return problem, base
 
 
-def _searched(problem: Problem, base: Model) -> Search:
-    """Searches at a given noise."""
-    best, judge = base, Judge(problem, base)
+def _searched(problem: Problem, base: Model, known: Model | None = None) -> Search:
+    """Searches at a given noise, from a model with effects that are known."""
+    best, judge = known or base, Judge(problem, base)
     stage: list[Model] = []
     alternatives: dict[str, list[Model]] = {}
     for _ in range(MOST):

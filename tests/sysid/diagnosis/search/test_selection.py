@@ -117,6 +117,7 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
     monkeypatch.setattr(searching, "_searched", searched)
     monkeypatch.setattr(searching, "_by_angle", lambda found: found)
+    monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
@@ -125,6 +126,30 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     found.problem = left  # the angle was searched, and is searched again
     search(problem)
     assert runs == 1 or seen[-1].left.tolist() == [5.0, 5.0]
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "gains", "kept"),
+    [
+        (("backlash",), (), True, True),
+        (("backlash",), (), False, False),
+        (("backlash",), ("backlash", "stiffness"), True, False),
+        (("backlash",), ("hysteresis",), True, True),
+    ],
+)
+def test_a_second_search_does_not_lose_the_answer_of_the_first(
+    monkeypatch, first, second, gains, kept
+):
+    """By the noise that the first left its starts may end in another valley."""
+    answer = SimpleNamespace(effects=first, fit=SimpleNamespace(theta=np.ones(1)))
+    again = SimpleNamespace(
+        problem="problem", base="base", best=SimpleNamespace(effects=second)
+    )
+    monkeypatch.setattr(searching, "fit_models", lambda *_, **__: [answer])
+    monkeypatch.setattr(searching, "accepted", lambda *_: gains)
+    monkeypatch.setattr(searching, "_searched", lambda *begun: begun)
+    found = searching._with_first(again, answer)
+    assert found == (("problem", "base", answer) if kept else again)
 
 
 def test_a_model_that_was_left_behind_is_fitted_from_where_the_smaller_one_is():
