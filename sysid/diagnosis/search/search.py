@@ -6,9 +6,7 @@ the penalty of the priors of the nuisance parameters (`candidate`), so that a pa
 far off its prior is a finding and not silently absorbed.
 """
 
-from dataclasses import dataclass, replace
-
-import numpy as np
+from dataclasses import dataclass
 
 from sysid.diagnosis.fits.candidate import (
     CONVERGED,
@@ -17,13 +15,12 @@ from sysid.diagnosis.fits.candidate import (
     likelihood_gap,
     log_likelihood_gain,
 )
-from sysid.diagnosis.fits.heldout import predicted
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.likelihood.folds import shorter_blocks
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.by_angle import explains, unsolved
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.judge import TRIED, Judge
+from sysid.diagnosis.search.parts import EXCESS, in_parts
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.settling import refitted, settled
 from sysid.diagnosis.search.stage import (
@@ -37,12 +34,6 @@ from sysid.diagnosis.simulated.output_starts import settled_output
 
 MOST = 3
 """Largest number of causes."""
-
-EXCESS = 1.5
-"""Mean squared whitened residual above which something may be unexplained."""
-
-MOST_SQUARE = 1e12
-"""Squared whitened residual that stands for what diverges [1]."""
 
 STRAINED = 25.0
 """Squared prior deviations of the nuisance parameters that are no accident [1]."""
@@ -147,29 +138,6 @@ def _by_angle(found: Search) -> Search:
     again = _searched(*start)
     left = again.base.errors[1], again.best.errors[1]
     return again if explains(*left) else found
-
-
-def in_parts(problem: Problem, base: Model) -> tuple[Problem, Model]:
-    """Holds out parts of a moment that alone has nearly all of the nominal error.
-
-    Nominal parameters far off their priors may fit that moment; then nearly all of the
-    error is in what the others predict of it.
-    """
-    if problem.whole:
-        return problem, base
-    counted, shape = problem.counts(), (2, *problem.fold.shape)
-    for error in (base.fit.residual, predicted(problem, base.fold_theta)):
-        squares = np.minimum(np.nan_to_num(error**2, nan=np.inf), MOST_SQUARE)
-        sums = squares.reshape(2, -1).sum(1)
-        if np.all(sums <= EXCESS * problem.channel_counts()):
-            continue
-        excess = (squares - counted).reshape(shape).sum(0)
-        parts = problem.data, problem.repeat, problem.fold, excess
-        fold, block_s = shorter_blocks(*parts)
-        if not np.array_equal(fold, problem.fold):
-            problem = replace(problem, fold=fold, block_s=block_s)
-            return problem, fit_models(problem, [()], [base.fit.theta])[0]
-    return problem, base
 
 
 def _searched(problem: Problem, base: Model, known: Model | None = None) -> Search:

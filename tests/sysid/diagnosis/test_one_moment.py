@@ -15,7 +15,7 @@ from sysid.diagnosis.fits.candidate import fit_models, log_likelihood_gain
 from sysid.diagnosis.likelihood import folds
 from sysid.diagnosis.likelihood.folds import BLOCK_S, SHORTEST_S, shorter_blocks
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.search import in_parts
+from sysid.diagnosis.search.parts import in_parts
 from sysid.diagnosis.search.selection import THRESHOLD
 from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.simulated.output_error import output_problem

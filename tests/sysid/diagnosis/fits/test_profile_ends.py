@@ -5,6 +5,7 @@ to the mass μ: x = (1 − ρ) sin t + 4 ρ² sin 3t with ρ = F / μ ρ₀. Onl
 seen, and μ has a tolerance; a step from F to 3.5 F shows another mixture.
 """
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -45,9 +46,10 @@ def record(rng):
 
 
 def fitted(problem: Any) -> Model:
-    """The fit with differences of the usual step; how large noise is, is known."""
+    """The fit with differences that are chords; how large noise is, is known."""
     task = task_of(problem, (EFFECT,), np.array([0.3 * SIZE, 0.0]))
-    (fit,) = fit_all(problem.residual, [task], 10)
+    chords = replace(task, steps=np.array([0.01, 0.0015]))
+    (fit,) = fit_all(problem.residual, [chords], 10)
     nothing = np.zeros(2)
     return Model((EFFECT,), fit, 0.0, 0.0, nothing[None], nothing, 0.0)
 
