@@ -18,8 +18,8 @@ from sysid.diagnosis.replay.motion import JointTrack, Track
 from sysid.diagnosis.replay.neighbours import pulling
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
 from sysid.diagnosis.replay.timing_uncertainty import (
-    sampling_uncertainty,
-    timing_uncertainty,
+    push_uncertainty,
+    residual_uncertainty,
 )
 from sysid.diagnosis.replay.validity import supported
 from sysid.drive import JointDrive
@@ -131,6 +131,11 @@ class _Joint:
         """Stacks a field of the rigid bodies."""
         return self.stacked([getattr(b, field)[:, self.j] for b in self.bodies])
 
+    def others_read(self) -> np.ndarray:
+        """Whether all other joints were read."""
+        others = [np.delete(p.valid, self.j, 1) for p in self.pieces]
+        return self.stacked([np.all(valid, axis=1) for valid in others])
+
     def efforts(self) -> list[np.ndarray]:
         """Torques of the drive in all pieces [N·m]; NaN where not logged."""
         return [
@@ -182,7 +187,8 @@ def _track(one: _Joint) -> JointTrack:
         dt=step_s,
         valid=np.stack([supported(p, one.j, steps) for p in pieces], 1)[rows],
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,
-        uncertainty=_uncertainty(fields, drive, step_s, rows),
+        uncertainty=residual_uncertainty(fields, drive, step_s)[:, rows],
+        pushed=push_uncertainty(fields["push"], one.others_read(), step_s),
         other=other,
         neighbours=pulls,
         armature=float(one.mechanism.model.dof_armature[dof]),
@@ -282,16 +288,3 @@ def _alike(targets: list[np.ndarray]) -> list[np.ndarray]:
     """Repeats the oldest target where a record of another rate has more of them."""
     most = max(x.shape[1] for x in targets)
     return [np.pad(x, [(0, 0), (most - x.shape[1], 0)], "edge") for x in targets]
-
-
-def _uncertainty(
-    track: dict[str, np.ndarray], drive: JointDrive, dt: float, rows: np.ndarray
-) -> np.ndarray:
-    """Uncertainty of both residuals (controller, mechanics)."""
-    measured = track["measured"] > 0.0
-    error = track["cmd"] - track["pos"]
-    servo = track["kp"] * error - track["kd"] * track["vel"]
-    fast = sampling_uncertainty(np.where(measured, track["effort"], servo))
-    late = timing_uncertainty(track["cmd"], track["vel"], track["kp"], drive, dt)
-    both = np.hypot(fast, late)
-    return np.stack([both, np.where(measured, fast, both)])[:, rows]

@@ -22,7 +22,7 @@ from sysid.diagnosis.likelihood.whitening import (
     correlation_time,
 )
 from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
-from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
+from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
 
 FAR = 1e3
@@ -84,8 +84,8 @@ class OutputProblem(Problem):
         When a servo takes a target is known to its cycle, so an angle that moves at
         speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²),
         with the largest |v| of three samples about it: a fast servo starts between two.
-        What others push is known as well as rows sample their motion: what is lost of
-        it, u of `sampling_uncertainty`, may move this joint by u / kp more.
+        What others push is known as well as rows sample their motion and as none of
+        them is missing: `JointTrack.pushed`, u, may move this joint by u / kp more.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -116,9 +116,8 @@ class OutputProblem(Problem):
 
     def _pushed(self) -> Float[np.ndarray, "t p"]:
         """Returns how far pushes of others, as sampled, may lead the angle astray."""
-        track = self.data.track
-        lost = sampling_uncertainty(np.asarray(track.push, float))
-        return lost / np.maximum(np.asarray(track.kp, float), 1e-12)
+        kp = np.asarray(self.data.track.kp, float)
+        return self.data.pushed / np.maximum(kp, 1e-12)
 
     def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes what a model leaves as noise: s'² = max(s_y², τ mean r²).
