@@ -7,7 +7,8 @@ from importlib import metadata
 
 from packaging.version import Version
 
-VARIABLE = "XLA_FLAGS"
+from envs.config.xla_flags import add_flags
+
 WITHOUT_FMA = "--xla_cpu_max_isa=AVX"
 WITHOUT_YNN = "--xla_cpu_experimental_ynn_fusion_type=-reduce"
 _FIRST_YNN = Version("0.11.1")
@@ -36,7 +37,4 @@ def fix_rounding(environment: MutableMapping[str, str] = os.environ) -> None:
     flags = [WITHOUT_FMA]
     if Version(metadata.version("jaxlib")) >= _FIRST_YNN:
         flags.append(WITHOUT_YNN)
-    given = environment.get(VARIABLE, "").split()
-    names = {flag.split("=")[0] for flag in given}
-    new = [flag for flag in flags if flag.split("=")[0] not in names]
-    environment[VARIABLE] = " ".join(given + new)
+    add_flags(environment, flags)

@@ -36,6 +36,7 @@ from benchmarks.diagnosis.plan import (
 )
 from benchmarks.diagnosis.score import Row, confusion, read_rows, report, statistics
 from fingers_mjx.studies.sweep.engines.held import CORES, Held, cores
+from sysid.diagnosis.whole_loops import compile_loops_whole
 
 RECORDS_OF_A_PROCESS = 12
 """After so many records a process is replaced: compiled programs take its memory."""
@@ -173,6 +174,7 @@ def _shown(task: Task, case: Case) -> bool:
 
 def main() -> None:
     """Runs the battery from the command line."""
+    compile_loops_whole()  # as the command does
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--seed", type=int, default=None, help="default: drawn")
     parser.add_argument("--wide", action="store_true", help="conditions of their own")

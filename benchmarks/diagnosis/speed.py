@@ -19,6 +19,7 @@ from benchmarks.diagnosis.hidden.sampling import Noise, record
 from benchmarks.diagnosis.hidden.scaling import logged
 from benchmarks.diagnosis.hidden.stands import make_stand, slightly_wrong
 from sysid.diagnosis.diagnose import diagnose
+from sysid.diagnosis.whole_loops import compile_loops_whole
 
 RECORDS = {
     "pendulum": ("pendulum", 500.0, 10.0, True),
@@ -34,6 +35,7 @@ GAP_RAD = 0.02
 
 def main() -> None:
     """Runs from the command line."""
+    compile_loops_whole()  # as the command does
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--kinds", nargs="+", choices=RECORDS, default=list(RECORDS))
     parser.add_argument("--seed", type=int, default=0)

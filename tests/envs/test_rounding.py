@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from envs import rounding
-from envs.rounding import VARIABLE, WITHOUT_FMA, WITHOUT_YNN, fix_rounding
+from envs.config.xla_flags import VARIABLE
+from envs.rounding import WITHOUT_FMA, WITHOUT_YNN, fix_rounding
 
 
 def pretend(monkeypatch, machine="x86_64", jaxlib="0.11.2"):

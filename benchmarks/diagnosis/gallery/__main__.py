@@ -29,6 +29,7 @@ from envs.config.atomic_file import write_atomic
 from envs.errors import InputError, one_of
 from fingers_mjx.reports.page import commit_here
 from sysid.diagnosis.diagnose import diagnose
+from sysid.diagnosis.whole_loops import compile_loops_whole
 from sysid.result import Diagnosis
 
 RECORDS = {
@@ -64,6 +65,7 @@ def answer(record: Record, said: Diagnosis) -> dict:
 
 def main() -> int:
     """Diagnoses the records that are asked for."""
+    compile_loops_whole()  # as the command does
     parser = argparse.ArgumentParser(description="Diagnose public records.")
     parser.add_argument("--folder", type=Path, required=True, help="of the clones")
     parser.add_argument("--fetch", action="store_true", help="clone what is missing")

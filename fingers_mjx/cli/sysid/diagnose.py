@@ -46,12 +46,14 @@ def run(args: argparse.Namespace) -> int:
     """Names what the simulation lacks; writes verdict, hand file and report."""
     from fingers_mjx.training.compile_cache import use_compile_cache
     from sysid.diagnosis.diagnose import examine
+    from sysid.diagnosis.whole_loops import compile_loops_whole
 
     use_compile_cache()
     mechanism, logs = records.mechanism_of(args), args.records
     if _walks(logs):
         hand = _without_effects(mechanism.hand, args, logs)
         return _write(args.out, _diagnosed_walk(logs[0], hand), hand)
+    compile_loops_whole()
     diagnosis, examined = examine(logs, mechanism, args.seed)
     _write(args.out, diagnosis, mechanism.hand)
     if not args.no_report:

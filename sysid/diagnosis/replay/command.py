@@ -14,6 +14,7 @@ readings that are late, the target was sent that much later.
 import flax.struct
 import jax
 import jax.numpy as jnp
+import numpy as np
 from jaxtyping import Array, Float
 
 from envs.actuator.effects.command_quantization import quantized
@@ -37,7 +38,7 @@ EFFECTS = (
 WITHIN = (0.35, 0.7)
 """Times within a step at which the command is returned too [steps]."""
 
-_WITHIN = jnp.asarray(WITHIN)[:, None, None]
+_WITHIN = np.asarray(WITHIN, np.float32)[:, None, None]
 
 Params = dict[str, dict[str, Float[Array, " c"]]]
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 
-from envs.rounding import VARIABLE as XLA
+from envs.config.xla_flags import VARIABLE as XLA
 from envs.rounding import fix_rounding
 from fingers_mjx.studies.sweep.engines.held import (
     CORES,
