@@ -34,7 +34,8 @@ ZERO_RAD = 1e-3
 
 SAMPLED = 1.0
 """Tolerance of the share of a ripple that an effort lacks which jumps with its targets:
-drives report it at one moment, before their target or behind it, or as a mean."""
+drives report it at one moment, before their target or behind it, or as a mean. And
+what they report has their damping of the speed's ripple in it, which no row shows."""
 
 ROTOR = 1.0
 """Tolerance of the logarithm of the motor's share of a joint's inertia."""
@@ -95,8 +96,7 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
         _nuisance("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
         _nuisance("rotor", "kg·m²", "log", rotor, ROTOR),
     ]
-    plain = not drive.effects.get("lowpass_cutoff")
-    if plain and track.effort.any():
+    if track.effort.any():  # behind a low-pass, too, that is quick against the rows
         sampled = _nuisance("ripple", "1", "linear", 1.0, SAMPLED)
         slots.append(replace(sampled, low=-1.0, high=1.0))
     if drive.cascade is not None and drive.cascade.k_int.value:
