@@ -8,7 +8,7 @@ several joints share are reported once, with where they act.
 """
 
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -16,19 +16,29 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from envs.errors import InputError
+from sysid.diagnosis.fits.candidate import Model
 from sysid.diagnosis.fits.problem import Problem, make_problem
 from sysid.diagnosis.fits.space import make_space
-from sysid.diagnosis.measured.in_time import Age
+from sysid.diagnosis.measured.in_time import Sensor
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.search import Examined, search
+from sysid.diagnosis.search.shown_beside import (
+    left,
+    solved,
+    suspected,
+    unsolved_beside,
+    with_cause,
+)
 from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.verdict.verdict import verdict_of
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 from sysid.result import Diagnosis
+
+MISREAD = {"sensor_latency", "clock_drift", "encoder_scale"}
+"""Effects by which a joint stands elsewhere than it was read."""
 
 
 def diagnose(
@@ -60,7 +70,7 @@ def examine(
     # a fit took 17 ms instead of 0.2 beside other work.
     with threadpool_limits(1, "blas"):
         joints = [partial(_examined, t, logs, mechanism) for t in tracks]
-        examined = beside_late(side_by_side(joints), logs, mechanism)
+        examined = beside_misread(side_by_side(joints), logs, mechanism)
         found = verdict_of(examined, mechanism, seed)
     found = replace(
         found,
@@ -70,57 +80,90 @@ def examine(
     return found, examined
 
 
-def beside_late(
+def beside_misread(
     examined: Sequence[Examined], logs: Sequence[MeasuredLog], mechanism: Mechanism
 ) -> list[Examined]:
-    """Examines joints again beside those whose readings were found to be late.
+    """Examines joints again beside those that stand elsewhere than they were read.
 
     What is a late reading and what a late target the joint beside it knows best: it
     stays as it was examined first unless less of its motion is left with the other in
-    time.
+    time. And a scale of an encoder of which its own joint shows too little is named if
+    that explains the motion of another one.
 
     Args:
         examined: every joint for itself.
         logs: the records.
         mechanism: the nominal simulation.
     """
-    late = {e.track.joint: a for e in examined for a in [age_of(e)] if a}
-    beside = [e.search is not None and e.track.joint not in late for e in examined]
-    if not late or not any(beside):
-        return list(examined)
-    tracks = all_tracks(logs, mechanism, late)
+    known = {e.track.joint: s for e in examined for s in [sensor_of(e)] if s}
+    examined = list(examined)
+    again = _again(examined, known, logs, mechanism, lambda e: True)
+    examined = [_nearer(e, again.get(e.track.joint, e)) for e in examined]
+    for k, one in enumerate(examined):
+        model = suspected(one.search) if one.search else None
+        if model is None:
+            continue
+        sensors = {**known, one.track.joint: _sensor(one.found.problem, model)}
+        again = _again(examined, sensors, logs, mechanism, _unsolved)
+        fresh = {
+            j: e
+            for j, e in again.items()
+            for was in examined
+            if was.track.joint == j and e.search and solved(was.found, e.search)
+        }
+        if fresh:
+            named = replace(one, search=with_cause(one.found, model))
+            examined[k] = named
+            examined = [fresh.get(e.track.joint, e) for e in examined]
+            known = sensors
+    return examined
+
+
+def _again(
+    examined: Sequence[Examined],
+    sensors: Mapping[str, Sensor],
+    logs: Sequence[MeasuredLog],
+    mechanism: Mechanism,
+    asked: Callable[[Examined], bool],
+) -> dict[str, Examined]:
+    """Examines again what is asked for beside joints that have such sensors."""
+    beside = [
+        e.search is not None and e.track.joint not in sensors and asked(e)
+        for e in examined
+    ]
+    if not sensors or not any(beside):
+        return {}
+    tracks = all_tracks(logs, mechanism, sensors)
     some = [t for t, counts in zip(tracks, beside, strict=True) if counts]
     again = side_by_side([partial(_examined, t, logs, mechanism) for t in some])
-    found = {e.track.joint: e for e in again}
-    return [_nearer(e, found.get(e.track.joint, e)) for e in examined]
+    return {e.track.joint: e for e in again}
 
 
-def age_of(examined: Examined) -> Age | None:
-    """Returns how late a joint's readings are, if that is one of its causes."""
+def _unsolved(examined: Examined) -> bool:
+    return unsolved_beside(examined.found)
+
+
+def sensor_of(examined: Examined) -> Sensor | None:
+    """Returns how a joint's sensor reads, if that is one of its causes."""
     found = examined.search
-    if found is None or not {"sensor_latency", "clock_drift"} & {*found.best.effects}:
+    if found is None or not MISREAD & {*found.best.effects}:
         return None
-    values, _ = found.problem.space.values(found.best.fit.theta[None])
-    drift_ppm = float(values["clock_drift"]["drift_ppm"][0])
-    return Age(float(values["sensor_latency"]["latency_s"][0]), 1e-6 * drift_ppm)
+    return _sensor(found.problem, found.best)
+
+
+def _sensor(problem: Problem, model: Model) -> Sensor:
+    """Returns how a sensor reads by a model."""
+    values, _ = problem.space.values(model.fit.theta[None])
+    return Sensor(
+        float(values["sensor_latency"]["latency_s"][0]),
+        1e-6 * float(values["clock_drift"]["drift_ppm"][0]),
+        float(values["encoder_scale"]["scale"][0]),
+    )
 
 
 def _nearer(first: Examined, again: Examined) -> Examined:
     """Chooses the examination that leaves less of the motion."""
-    return min(first, again, key=_left)
-
-
-def _left(examined: Examined) -> float:
-    """Returns what a joint's best model leaves, Σ r²; all where it was not examined.
-
-    Of the angle, where it can be simulated: one search may be by it, and one not.
-    """
-    found = examined.search
-    if found is None:
-        return np.inf
-    best = nearest(found.judge, found.best)
-    raw = found.judge.output.raw(best.fit.theta[None], weigh=False)
-    return float(np.sum(raw**2))
+    return min(first, again, key=lambda e: left(e.search) if e.search else np.inf)
 
 
 def _examined(

@@ -9,7 +9,7 @@ import numpy as np
 
 from envs.errors import InputError, one_of
 from sysid.diagnosis.measured.checks import check_records
-from sysid.diagnosis.measured.in_time import Age, in_time
+from sysid.diagnosis.measured.in_time import Sensor, in_time
 from sysid.diagnosis.measured.resampling import smoothed
 from sysid.diagnosis.measured.segments import Piece, grid_step_s, pieces_of
 from sysid.diagnosis.replay.band import BAND_STEPS, sample_rows
@@ -37,19 +37,19 @@ _RIGID = (
 def all_tracks(
     logs: Sequence[MeasuredLog],
     mechanism: Mechanism,
-    late: Mapping[str, Age] = MappingProxyType({}),
+    sensors: Mapping[str, Sensor] = MappingProxyType({}),
 ) -> list[JointTrack]:
     """Returns the tracks of all joints that are in the records.
 
     Args:
         logs: the records.
         mechanism: the nominal simulation.
-        late: joints that stand where they were when they were read, for the others.
+        sensors: of joints that stand, for the others, where they were when read.
 
     Raises:
         InputError: joints that the mechanism lacks, or no piece that is long enough.
     """
-    pieces, bodies, step_s = measured_pieces(logs, mechanism, late)
+    pieces, bodies, step_s = measured_pieces(logs, mechanism, sensors)
     return [
         _track(_Joint(mechanism, logs, pieces, bodies, step_s, j))
         for j in range(len(logs[0].header.joints))
@@ -59,7 +59,7 @@ def all_tracks(
 def measured_pieces(
     logs: Sequence[MeasuredLog],
     mechanism: Mechanism,
-    late: Mapping[str, Age] = MappingProxyType({}),
+    sensors: Mapping[str, Sensor] = MappingProxyType({}),
 ) -> tuple[list[Piece], list[Bodies], float]:
     """Puts records on a common grid: pieces, what bodies do in them, and the step [s].
 
@@ -88,7 +88,7 @@ def measured_pieces(
         longest = max(float(np.ptp(log.t_s)) for log in logs)
         valid = "at least 1.5 s of readings without a jump of the clock"
         raise InputError(logs[0].source, "t", f"{longest:.3g} s in pieces", valid)
-    pieces = in_time(pieces, joints, late)
+    pieces = in_time(pieces, joints, sensors)
     pulls = [mount_gravity(mechanism, log.header.palm_quat_w) for log in logs]
     bodies = [
         bodies_along(mechanism, joints, JointMotion(p.pos, p.vel, p.acc), pulls[p.log])

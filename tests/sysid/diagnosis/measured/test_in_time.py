@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from sysid.diagnosis import diagnose
-from sysid.diagnosis.measured.in_time import Age, in_time
+from sysid.diagnosis.measured.in_time import Sensor, in_time
 from sysid.diagnosis.measured.segments import Piece
 
-AGE = Age(latency_s=0.03, drift=1e-3)
+AGE = Sensor(latency_s=0.03, drift=1e-3)
 
 
 def test_late_readings_are_put_to_when_they_were_taken():
@@ -28,11 +28,22 @@ def test_late_readings_are_put_to_when_they_were_taken():
     np.testing.assert_array_equal(found.cmd, two)
 
 
+def test_what_an_encoder_counts_too_much_goes_and_torques_stay():
+    seen = np.linspace(0.5, 2.0, 50)[:, None]
+    rest = dict.fromkeys(Piece.__dataclass_fields__, seen)
+    piece = Piece(**(rest | {"t_s": 0.01 * np.arange(50), "log": 0, "every": 1}))
+    (found,) = in_time([piece], ("a",), {"a": Sensor(scale=1.25)})
+    for name in ("pos", "vel", "acc"):
+        np.testing.assert_allclose(getattr(found, name), seen / 1.25)
+    np.testing.assert_allclose(found.effort, seen)
+
+
 def examined(joint, effects=(), left=0.0):
     """What was done with a joint of which some error is left."""
     values = {
         "sensor_latency": {"latency_s": np.array([AGE.latency_s])},
         "clock_drift": {"drift_ppm": np.array([1e6 * AGE.drift])},
+        "encoder_scale": {"scale": np.array([1.0])},
     }
     problem = SimpleNamespace(
         raw=lambda thetas, weigh: np.array([left]),
@@ -42,7 +53,7 @@ def examined(joint, effects=(), left=0.0):
     best = SimpleNamespace(effects=effects, fit=fit, errors=np.ones(2))
     judge: Any = SimpleNamespace(output=problem, moved=lambda model: model)
     judge.serving = lambda model: judge
-    found = SimpleNamespace(problem=problem, best=best, judge=judge)
+    found = SimpleNamespace(problem=problem, best=best, judge=judge, rejected=[])
     return SimpleNamespace(track=SimpleNamespace(joint=joint), search=found)
 
 
@@ -63,7 +74,7 @@ def test_joints_beside_a_late_one_are_examined_again(
         diagnose, "_examined", lambda track, logs, mechanism: examined("b", left=after)
     )
     before = [examined("a", (effect,)), examined("b", left=0.5)]
-    joints = diagnose.beside_late(before, [], None)
+    joints = diagnose.beside_misread(before, [], None)
     assert late == asked * [{"a": AGE}]
     assert joints[0] is before[0]
     assert (joints[1] is not before[1]) == bool(asked and better)
