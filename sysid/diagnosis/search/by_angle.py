@@ -8,7 +8,8 @@ it names, so much of the angle's error has to go, however little remains.
 """
 
 from sysid.diagnosis.fits.candidate import Model
-from sysid.diagnosis.search.judge import LEAST_FALL, LEFT, REMAINING, Judge
+from sysid.diagnosis.search.judge import LEAST_FALL, Judge
+from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 
@@ -19,16 +20,6 @@ def nearest(judge: Judge, model: Model) -> Model:
     """
     fits = (judge.moved(model), judge.serving(model).moved(model))
     return min(fits, key=lambda m: float(m.errors.sum()))
-
-
-def leaves_much(before: float, after: float) -> bool:
-    """Whether of an error before causes more is left than noise and model error.
-
-    Args:
-        before: mean squared error of the nominal model, in units of its noise [1].
-        after: the same with the causes [1].
-    """
-    return after > LEFT and after - 1.0 > REMAINING * (before - 1.0)
 
 
 def explains(before: float, after: float) -> bool:

@@ -41,6 +41,7 @@ from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.fits.tolerances import within_tolerances
 from sysid.diagnosis.replay.band import EVERY, sample_rows
+from sysid.diagnosis.search.remains import LEFT, becomes_noise
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
@@ -59,16 +60,6 @@ below it are 9 of 16 false alarms, 5 of 35 wrong causes and 4 of 428 right ones.
 share of the square above the noise of repeats does not separate them: false alarms
 remove 0.32 to 1.00 of it, right causes 0.28 to 1.00.
 """
-
-LEFT = 2.0
-"""Mean squared error that may remain, in units of its noise: of the angle it is at most
-1.6 of 26 joints without effects, and at least 2.2 of those with one that is not in the
-catalogue (hidden mechanisms of two seeds)."""
-
-REMAINING = 0.2
-"""Share of the removable squared error that may remain of a complete explanation: its
-equation is right to half of its trace. Of a friction that falls with speed 0.17 remains
-about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
 
 LITTLE = 0.01
 """Share of a squared error below which next to nothing of it is left; friction that
@@ -248,15 +239,19 @@ class Judge:
         """Whether much goes of an error of angle or explained effort, or all but noise.
 
         Noise is of repeats, or what neighbouring readings of the angle do not share: by
-        the same noise the verdict would be that something is unexplained.
+        the same noise the verdict would be that something is unexplained. Repeats show
+        all of it, neighbours only a part: by these what is left may be noise.
         """
         worse, better = self.pair(smaller, larger)
         left = (larger.errors.max() / smaller.errors.max()) ** 0.5
         explained = self._explains(smaller, larger) and 1.0 - left > LEAST_FALL
         if explained or self.fall(worse, better) > LEAST_FALL:
             return True
-        known = self.problem.repeat or isinstance(self.output, OutputProblem)
-        return bool(known and worse.errors.max() > LEFT > better.errors.max())
+        before, after = worse.errors.max(), better.errors.max()
+        if self.problem.repeat:
+            return becomes_noise(before, after)
+        known = isinstance(self.output, OutputProblem)
+        return bool(known and before > LEFT > after)
 
     def prefers(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better than the smaller one."""
@@ -284,4 +279,4 @@ class Judge:
             return False
         if not self.problem.repeat:
             return bool(before > LEFT and after < LITTLE * before)
-        return bool(before > LEFT > after and after - 1 < REMAINING * (before - 1))
+        return becomes_noise(before, after)

@@ -20,7 +20,7 @@ from sysid.diagnosis.fits.intervals import standard_errors
 from sysid.diagnosis.fits.parameters import Slot
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.profile import profiled, resolved
-from sysid.diagnosis.search.judge import LEFT
+from sysid.diagnosis.search.remains import LEFT
 from sysid.diagnosis.search.search import Search
 from sysid.result import Estimate
 

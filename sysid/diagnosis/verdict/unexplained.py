@@ -25,7 +25,8 @@ from sysid.diagnosis.fits.candidate import (
     log_likelihood_gain,
 )
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.search.by_angle import leaves_much, nearest
+from sysid.diagnosis.search.by_angle import nearest
+from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
 from sysid.diagnosis.simulated.output_error import OutputProblem

@@ -8,7 +8,8 @@ import pytest
 
 from sysid.diagnosis.search import by_angle
 from sysid.diagnosis.search import search as search_module
-from sysid.diagnosis.search.by_angle import leaves_much, unsolved
+from sysid.diagnosis.search.by_angle import unsolved
+from sysid.diagnosis.search.remains import leaves_much
 
 
 def model(error, effects=()):

@@ -97,10 +97,15 @@ def test_a_difference_that_is_sure_but_small_is_no_cause():
         ((2.8, 1.1), False, False),
         ((1.1, 1.0), True, False),
         ((9.9, 9.6), True, False),
+        ((2.1, 1.9), True, False),
+        ((2.01, 1.49), True, False),
     ],
 )
 def test_an_error_that_becomes_all_but_noise_matters(angle, repeat, matters):
-    """A slew limit by direction: noise is most of the error, and all that it leaves."""
+    """A slew limit by direction: noise is most of the error, and all that it leaves.
+
+    A tilt in the place of a cable that goes slack leaves half of what was more.
+    """
     judge = Said(ENOUGH, 2.0 * LEVEL, repeat=repeat, fall=0.6 * LEAST_FALL)
     judge.angle = angle
     assert says(judge) == matters
