@@ -12,6 +12,9 @@ What happens now and then, and not again when the motion is repeated, passes for
 but noise of readings has no outliers: on 36 effect-free records none lies beyond 6.5
 standard deviations. Where an effect is named, sticking that ends a little earlier in
 one repeat than in the next is expected of the mechanics; the controller does not stick.
+A target that arrives out of turn makes a step of the effort, of which the joint's
+inertia leaves little in the angle: where the effort was logged, both are looked at. But
+without a low-pass every target is such a step, and clocks decide which readings see it.
 """
 
 from dataclasses import dataclass
@@ -67,6 +70,7 @@ def unexplained_signs(found: Search) -> list[str]:
         *_at_bounds(found),
         *_off_prior(found),
         *_irregular(left),
+        *_irregular_effort(found, left),
     ]
     return [f"{joint}: {text}" for text in texts]
 
@@ -146,16 +150,34 @@ def _off_prior(found: Search) -> list[str]:
 
 def _irregular(left: _Left) -> list[str]:
     """Finds what does not recur in repeats of the motion."""
-    problem = left.problem
+    problem, best = left.problem, left.best
+    sticks = {"mechanics", "position"} if best.effects else set()
+    return _jumping(problem, best, set(problem.channels) - sticks)
+
+
+def _irregular_effort(found: Search, left: _Left) -> list[str]:
+    """Finds what does not recur in the logged effort, beside a simulated angle."""
+    problem = found.problem
+    if isinstance(problem, OutputProblem):
+        problem = problem.equations
+    if problem is None or problem is left.problem:
+        return []
+    path = problem.space.values(problem.space.nominal[None])[0]["lowpass_cutoff"]
+    if not np.isfinite(path["cutoff_hz"][0]):
+        return []
+    return _jumping(problem, found.best, {"controller"})
+
+
+def _jumping(problem: Problem, best: Model, names: set[str]) -> list[str]:
+    """Finds jumps that do not repeat in the residuals of these names."""
     if not problem.repeat:
         return []
-    raw = problem.raw(left.best.fit.theta[None])[0]
-    texts = []
-    for k, name in enumerate(problem.channels):
-        sticks = name != "controller" and left.best.effects
-        if not sticks and _jumps(problem, raw[k], k):
-            texts.append(f"the {name} residual has jumps that do not repeat")
-    return texts
+    raw = problem.raw(best.fit.theta[None])[0]
+    return [
+        f"the {name} residual has jumps that do not repeat"
+        for k, name in enumerate(problem.channels)
+        if name in names and _jumps(problem, raw[k], k)
+    ]
 
 
 def _jumps(problem: Problem, raw: np.ndarray, k: int) -> bool:

@@ -152,7 +152,24 @@ def test_jumps_that_do_not_repeat_are_not_noise(searched):
     assert any("position residual has jumps" in text for text in signs)
     model = fit_models(problem, [("hysteresis",)], [searched.base.fit.theta])[0]
     signs = unexplained_signs(replace(found, best=model))
-    assert not any("jumps" in text for text in signs)
+    assert not any("position residual has jumps" in text for text in signs)
+
+
+@pytest.mark.parametrize("times", [3.0, 30.0])
+def test_jumps_of_the_effort_alone_are_not_noise(searched, times):
+    """Packets that change places: a joint's inertia leaves nothing in the angle."""
+    problem = searched.problem
+    track, noise = problem.data.track, problem.data.noise[1]
+    effort = np.array(track.effort)
+    rows = np.flatnonzero(problem.valid[0][:, 0])[[200, 700]] * 4 + 8
+    for row in rows:
+        effort[row - 1 : row + 2] += times * noise
+    data = replace(problem.data, track=track.replace(effort=effort))
+    jumpy = replace(problem, data=data)
+    found = replace(searched, problem=jumpy, judge=Judge(jumpy, searched.base))
+    signs = [text for text in unexplained_signs(found) if "jumps" in text]
+    assert all("controller" in text for text in signs)
+    assert bool(signs) == (times > 10.0)
 
 
 def test_a_parameter_that_is_far_off_its_prior_goes_on_from_there(searched):
