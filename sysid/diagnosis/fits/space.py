@@ -96,7 +96,7 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
         _nuisance("hold_s", "s", "linear", 1e-3, HOLD_S / 1e-3),
         _nuisance("rotor", "kg·m²", "log", rotor, ROTOR),
     ]
-    if track.effort.any():  # behind a low-pass, too, that is quick against the rows
+    if track.effort.any() and _saw_is_met(track, drive):
         sampled = _nuisance("ripple", "1", "linear", 1.0, SAMPLED)
         slots.append(replace(sampled, low=-1.0, high=1.0))
     if drive.cascade is not None and drive.cascade.k_int.value:
@@ -107,6 +107,21 @@ def _nuisances(track: JointTrack, drive: JointDrive) -> list[Slot]:
         free = _nuisance("push_gain", "1", "linear", 1.0, math.inf)
         slots.append(replace(free, nominal=1.0))
     return slots
+
+
+def _saw_is_met(track: JointTrack, drive: JointDrive) -> bool:
+    """Whether a target is mostly reached before the next: the command is then a saw.
+
+    Without a low-pass, or behind one that goes most of a way within the period T of the
+    targets, 1 − exp(−2π f T) > 1 − 1/e.
+    """
+    path = drive.effects.get("lowpass_cutoff")
+    gaps = np.diff(np.asarray(track.track.sent), axis=1)
+    apart = gaps[gaps > 0.0]
+    if not path or not apart.size:
+        return not path
+    period_s = track.dt * float(np.median(apart))
+    return 2.0 * math.pi * path["cutoff_hz"].value * period_s > 1.0
 
 
 def _nuisance(name: str, unit: str, kind: Kind, scale: float, tolerance: float) -> Slot:

@@ -11,6 +11,7 @@ from sysid.diagnosis.fits.candidate import fit_models, likelihood_gap, task_of
 from sysid.diagnosis.likelihood.whitening import Noise
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS, smoothed
 from sysid.diagnosis.replay.band import sample_rows
+from sysid.diagnosis.replay.timing_uncertainty import push_uncertainty
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S
 from sysid.diagnosis.simulated.output_error import output_problem
 
@@ -66,11 +67,12 @@ def test_noise_without_repeats_is_that_of_the_smoothed_angle():
 
 def test_where_others_push_faster_than_is_sampled_the_angle_counts_less():
     output = output_problem(silent())
-    track = output.data.track
+    track, dt = output.data.track, output.data.dt
     push = np.zeros(np.shape(track.push))
     half = len(push) // 2
     push[half::2] = 0.01 * float(np.min(np.asarray(track.kp)))
-    pushed = replace(output, data=replace(output.data, track=replace(track, push=push)))
+    unsure = push_uncertainty(push, np.ones(push.shape, bool), dt)
+    pushed = replace(output, data=replace(output.data, pushed=unsure))
     rng = np.random.default_rng(0)
     raw = np.stack([0.0 * output.valid[1], rng.normal(0.0, 3e-4, output.fold.shape)])
     share = pushed.with_noise(raw).weight[1] / output.with_noise(raw).weight[1]
