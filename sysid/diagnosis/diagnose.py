@@ -105,15 +105,14 @@ def beside_misread(
             continue
         sensors = {**known, one.track.joint: _sensor(one.found.problem, model)}
         again = _again(examined, sensors, logs, mechanism, _unsolved)
+        before = {e.track.joint: e for e in examined}
         fresh = {
             j: e
             for j, e in again.items()
-            for was in examined
-            if was.track.joint == j and e.search and solved(was.found, e.search)
+            if e.search and solved(before[j].found, e.search)
         }
         if fresh:
-            named = replace(one, search=with_cause(one.found, model))
-            examined[k] = named
+            examined[k] = replace(one, search=with_cause(one.found, model))
             examined = [fresh.get(e.track.joint, e) for e in examined]
             known = sensors
     return examined

@@ -116,11 +116,11 @@ def _saw_is_met(track: JointTrack, drive: JointDrive) -> bool:
     targets, 1 − exp(−2π f T) > 1 − 1/e.
     """
     path = drive.effects.get("lowpass_cutoff")
+    if not path:
+        return True
     gaps = np.diff(np.asarray(track.track.sent), axis=1)
     apart = gaps[gaps > 0.0]
-    if not path or not apart.size:
-        return not path
-    period_s = track.dt * float(np.median(apart))
+    period_s = track.dt * float(np.median(apart)) if apart.size else 0.0
     return 2.0 * math.pi * path["cutoff_hz"].value * period_s > 1.0
 
 
