@@ -5,6 +5,8 @@ UV := $(or $(shell command -v uv 2>/dev/null),.uv/bin/uv)
 RUN := $(UV) run --no-sync
 QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 	tests/test_documentation.py tests/rewards
+TWO := -n 2 --dist loadfile --max-worker-restart 0 # a crash ends it
+DIAGNOSES := tests/sysid/diagnosis tests/benchmarks/diagnosis
 LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged_runs.py
 
 .DEFAULT_GOAL := help
@@ -41,7 +43,8 @@ check: sync ## What CI runs first: style, types, quick tests; changes nothing
 	$(RUN) pytest -q -n 2 $(QUICK)
 
 test: sync ## All tests for two CPU cores
-	$(RUN) pytest tests -n 2 --dist loadfile --max-worker-restart 0 # a crash ends it
+	$(RUN) pytest tests $(DIAGNOSES:%=--ignore=%) $(TWO)
+	$(RUN) pytest $(DIAGNOSES) --whole-loops $(TWO)
 	$(RUN) pytest deploy/tests # alone: some of them run in real time
 
 test-loggers: sync ## The tests of the extras wandb and rerun, which it installs (600 MB)

@@ -23,6 +23,21 @@ UNSAFE = ("pickle.find_class", "os.system")
 LOOPBACK = ("127.0.0.1", "::1", "localhost", "")
 
 
+def pytest_addoption(parser):
+    """Adds how the tests of diagnoses are run by `make test`."""
+    words = "compile loops over time as the command that diagnoses does"
+    parser.addoption("--whole-loops", action="store_true", help=words)
+
+
+def pytest_configure(config):
+    """Asks for whole loops before anything is computed; also in every worker."""
+    if config.getoption("--whole-loops"):
+        # Not before the hook above: what it imports is checked, too.
+        from sysid.diagnosis.whole_loops import compile_loops_whole
+
+        compile_loops_whole()
+
+
 MAPS = Path("/proc/self/maps")
 MOST_MAPS = 25_000
 """Mapped regions with which a process begins a file of tests: every compiled program
