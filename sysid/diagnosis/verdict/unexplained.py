@@ -28,6 +28,7 @@ from sysid.diagnosis.fits.candidate import (
     log_likelihood_gain,
 )
 from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.likelihood.whitening import bulk_deviation
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.search.search import Search
@@ -39,8 +40,9 @@ OUTLIER_SD = 8.0
 """Standard deviations of the noise that no sample of it reaches."""
 
 PRIOR_NOISE_SD = 3.0
-"""Standard deviations of the noise before a cause was found that a jump exceeds too:
-with a cause that removes nearly all, steps of an encoder look like jumps."""
+"""Standard deviations that a jump exceeds too, of the noise before a cause was found,
+and of what a cycle of a servo makes of an angle at speed: with one that removes nearly
+all, steps of an encoder look like jumps."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,13 +183,20 @@ def _jumping(problem: Problem, best: Model, names: set[str]) -> list[str]:
 
 
 def _jumps(problem: Problem, raw: np.ndarray, k: int) -> bool:
-    """Whether the difference of repeats has outliers."""
+    """Whether the difference of repeats has outliers.
+
+    Weighted w = 1 / √(1 + (u / s)²), one that is uncertain by u may differ by w u =
+    s √(1 − w²), however quiet the others are: cycles of a servo need not all differ.
+    """
     series, valid = problem.differences(raw, problem.valid[k])
     if not valid.any():
         return False
-    x = np.abs(series[valid])
+    x, weight = np.abs(series[valid]), problem.weight[k]
     # Where weights differ, most samples may be quiet: a normal one is below twice its
     # deviation in 95 of 100.
     spread = max(np.median(x) / 0.6745, np.quantile(x, 0.95) / 1.96)
-    least = max(OUTLIER_SD * spread, PRIOR_NOISE_SD * problem.noise[k].deviation)
-    return bool(np.max(x) > least)
+    even, _ = problem.differences(raw / weight, problem.valid[k])
+    unsure = bulk_deviation(even[valid]) * np.sqrt(1.0 - weight[valid] ** 2)
+    noise = np.maximum(problem.noise[k].deviation, unsure)
+    least = np.maximum(OUTLIER_SD * spread, PRIOR_NOISE_SD * noise)
+    return bool(np.any(x > least))

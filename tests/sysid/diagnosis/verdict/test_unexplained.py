@@ -195,6 +195,20 @@ def test_steps_of_an_encoder_are_no_jumps(searched):
     assert _jumps(problem, quiet[0], 0)
 
 
+@pytest.mark.parametrize(("times", "jumps"), [(1.0, False), (10.0, True)])
+def test_what_a_cycle_makes_of_an_angle_at_speed_is_no_jump(searched, times, jumps):
+    """Cycles that mostly fall alike leave fast samples, which weigh little, quiet."""
+    problem, share = searched.problem, 0.05
+    size, weight = problem.noise[0].deviation, np.full_like(problem.weight, share)
+    noise = tuple(replace(n, deviation=share * n.deviation) for n in problem.noise)
+    problem = replace(problem, weight=weight, noise=noise)
+    error = size * np.random.default_rng(2).normal(size=weight.shape[1:])
+    twin = problem.differences(error, problem.valid[0])[1]
+    # Weighing as little, it is uncertain by 1 / w times the noise.
+    error[tuple(np.argwhere(twin)[-50])] += np.sqrt(2.0) * times * size / share
+    assert _jumps(problem, weight[0] * error, 0) == jumps
+
+
 def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     """The first of two causes was chosen when it had to stand for both."""
     problem = searched.problem
