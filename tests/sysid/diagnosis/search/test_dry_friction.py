@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from sysid.diagnosis.fits.parameters import Slot, Space
-from sysid.diagnosis.search.presliding import RESOLVED, is_dry, repeats_friction
+from sysid.diagnosis.replay.band import BAND_STEPS, sample_rows
+from sysid.diagnosis.search.presliding import (
+    RESOLVED,
+    is_dry,
+    repeats_friction,
+    turning_travel,
+)
 from sysid.diagnosis.search.stage import _simplest_first, deciding_gap
 
 NOISE_RAD = 1e-3
@@ -17,10 +23,20 @@ HEIGHT = Slot("hysteresis", "torque_nm", "N·m", "linear", 1.0, 0.0, 0.0, 9.0, 0
               True)  # fmt: skip
 RANGE = Slot("hysteresis", "range_rad", "rad", "linear", 1.0, 0.0, 0.0, 9.0, 0.0, (),
              False)  # fmt: skip
+STEP_S, STEPS, RATE, SWING = 0.01, 4000, 3.0, 0.5
+
+
+def track(swing) -> Any:
+    """A sine of 3 rad/s; it turns at q̈ = 9 times its size."""
+    t_s = STEP_S * np.arange(STEPS)[:, None]
+    vel, acc = RATE * np.cos(RATE * t_s), -(RATE**2) * np.sin(RATE * t_s)
+    motion = SimpleNamespace(vel=swing * vel, acc=swing * acc)
+    valid = np.ones((len(sample_rows(STEPS)), 1), bool)
+    return SimpleNamespace(noise=(NOISE_RAD, 0.0), track=motion, valid=valid, dt=STEP_S)
+
+
 PROBLEM: Any = SimpleNamespace(
-    space=Space((COULOMB, HEIGHT, RANGE)),
-    samples=2000,
-    data=SimpleNamespace(noise=(NOISE_RAD, 0.0)),
+    space=Space((COULOMB, HEIGHT, RANGE)), samples=2000, data=track(0.0)
 )
 DRY, WIDE = 0.9 * RESOLVED * NOISE_RAD, 1.1 * RESOLVED * NOISE_RAD
 
@@ -62,6 +78,17 @@ def test_small_gains_tie_as_those_of_other_effects_do():
     """A tenth of 20 nat would decide where the usual 3 nat do not."""
     assert first(2.5, DRY, gain=20.0) == "coulomb_friction"
     assert first(3.5, DRY, gain=20.0) == "hysteresis"
+
+
+def test_a_range_that_is_crossed_within_the_band_of_a_turn_is_dry():
+    crossed = 0.5 * RATE**2 * SWING * (BAND_STEPS * STEP_S) ** 2
+    assert turning_travel(track(SWING)) == pytest.approx(crossed, rel=1e-3)
+    assert turning_travel(track(0.0)) == 0.0
+    fast = SimpleNamespace(**vars(PROBLEM) | {"data": track(SWING * 10.0)})
+    wide = model(("hysteresis",), 0.0, 9.0 * crossed)
+    assert is_dry(fast, wide)
+    assert not is_dry(PROBLEM, wide)
+    assert not is_dry(fast, model(("hysteresis",), 0.0, 11.0 * crossed))
 
 
 def test_the_effect_added_last_is_the_one_that_is_judged():
