@@ -84,7 +84,7 @@ def test_a_range_that_is_crossed_within_the_band_of_a_turn_is_dry():
     crossed = 0.5 * RATE**2 * SWING * (BAND_STEPS * STEP_S) ** 2
     assert turning_travel(track(SWING)) == pytest.approx(crossed, rel=1e-3)
     assert turning_travel(track(0.0)) == 0.0
-    fast = SimpleNamespace(**vars(PROBLEM) | {"data": track(SWING * 10.0)})
+    fast: Any = SimpleNamespace(**vars(PROBLEM) | {"data": track(SWING * 10.0)})
     wide = model(("hysteresis",), 0.0, 9.0 * crossed)
     assert is_dry(fast, wide)
     assert not is_dry(PROBLEM, wide)
