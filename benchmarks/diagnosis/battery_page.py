@@ -18,7 +18,7 @@ from benchmarks.diagnosis.score import Row, confusion, read_rows, statistics
 from envs.config.atomic_file import write_atomic
 from sysid.diagnosis.verdict.posterior import CALIBRATION
 
-SEED, PLANNED, COMMIT = 5969168, 700, "b0b141e"
+SEED, PLANNED, COMMIT = 10033827, 700, "cef48d6"
 ROWS = Path(f"benchmarks/results/battery-wide-{SEED}.jsonl")
 PAGE = Path("docs/results/battery.md")
 FIGURE = Path("docs/images/reliability.png")

@@ -65,7 +65,8 @@ def test_the_search_finds_the_stored_stance(tmp_path):
 
 
 def test_a_search_is_repeatable(tmp_path, capsys):
-    argv = ["hand", "stance", "--seed", "0", "--starts", "1"]
+    # Whether a start ends standing hangs on the processor's last bits: three do.
+    argv = ["hand", "stance", "--seed", "0", "--starts", "3"]
     said = []
     for _ in range(2):
         assert main(argv) == 0
