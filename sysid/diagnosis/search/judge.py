@@ -206,8 +206,8 @@ class Judge:
     def fall(self, worse: Model, better: Model) -> float:
         """1 − √(Σ w² e₁² / Σ w² e₀²), what goes of the error of held-out angles [1].
 
-        Without repeats with weights w of no more lateness than the better model leaves:
-        what its predictions are not late by is no servo's cycle in the worse one.
+        With weights w of no more lateness than the better model leaves: what its
+        predictions are not late by is not what a servo's cycle makes of the worse one.
 
         Args:
             worse: the model of e₀.

@@ -124,15 +124,11 @@ def simulated(
     return found[np.argsort(np.concatenate(order))]
 
 
-def is_slow(problem: Problem) -> bool:
-    """Whether targets come through a low-pass that is slow against a servo's cycle."""
-    path = problem.space.values(problem.space.nominal[None])[0]["lowpass_cutoff"]
-    return SLOW * TARGET_S * float(path["cutoff_hz"][0]) < 1.0
-
-
 def _target_s(problem: Problem) -> float:
     """Returns for how long targets may be averaged [s]."""
-    return TARGET_S if is_slow(problem) else SUBSTEP_S
+    path = problem.space.values(problem.space.nominal[None])[0]["lowpass_cutoff"]
+    slow = SLOW * TARGET_S * float(path["cutoff_hz"][0]) < 1.0
+    return TARGET_S if slow else SUBSTEP_S
 
 
 def _parts(whole_s: float, most_s: float) -> int:

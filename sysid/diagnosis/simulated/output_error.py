@@ -23,7 +23,7 @@ from sysid.diagnosis.likelihood.whitening import (
 )
 from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
-from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, is_slow, simulated
+from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
 from sysid.diagnosis.simulated.taken import shown_lateness
 
 FAR = 1e3
@@ -86,9 +86,7 @@ class OutputProblem(Problem):
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes the noise from the repeats of the error, else from its neighbours.
 
-        Weights are those of `weights`, with as much lateness as repeats show behind a
-        slow low-pass: what all are late by alike is a delay there. Without it a reading
-        sees the torque before a jump or behind it, in all repeats the same.
+        Weights are those of `weights`, with as much lateness as repeats show.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -99,15 +97,15 @@ class OutputProblem(Problem):
         Source:
             Ours; as `Problem.with_noise`.
         """
-        valid, late_s = self.valid[1], CYCLE_S
+        valid = self.valid[1]
         if self.repeat:
             series, counts = self.repeat.differences(raw[1], valid)
             size = bulk_deviation(series[counts]) if counts.any() else 1.0
-            if is_slow(self):
-                late_s = shown_lateness(series, size, self._speed(), counts)
+            late_s = shown_lateness(series, size, self._speed(), counts)
         else:
             readings = np.array([self.reading_noise**2, 0.0, 0.0])
             size = difference_noise(raw[1], valid, readings, band_steps=0.0)
+            late_s = CYCLE_S
         sized = replace(self, size=size, late_s=late_s)
         weight, noise = sized.weights(late_s), Noise(np.zeros(0), size)
         if self.repeat:
@@ -135,14 +133,13 @@ class OutputProblem(Problem):
         return 1.0 / np.hypot(1.0, unsure / self.size)
 
     def lateness(self, error: Float[np.ndarray, "m p"]) -> float:
-        """Returns the lateness that the error of a model leaves; repeats know it [s].
+        """Returns the lateness that the error of a model leaves, at most the known [s].
 
         Args:
             error: of the angle [rad].
         """
-        if self.repeat:
-            return self.late_s
-        return shown_lateness(error, self.size, self._speed(), self.valid[1])
+        shown = shown_lateness(error, self.size, self._speed(), self.valid[1])
+        return min(shown, self.late_s)
 
     def _speed(self) -> Float[np.ndarray, "m p"]:
         """Returns the largest speed about every sample."""

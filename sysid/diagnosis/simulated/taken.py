@@ -28,7 +28,7 @@ def shown_lateness(
         E d² ≥ s² + σ² v²,   σ² ≤ Σ (d² − s²) v² / Σ v⁴,   0 ≤ σ ≤ `CYCLE_S`
 
     by least squares of d² on v². Repeats at the same phase leave no more than these;
-    behind a low-pass what all of them are late by alike is a delay.
+    what all of them are late by alike is a delay.
 
     Args:
         left: d, difference of repeats of the variance of one, or error of a model
