@@ -46,7 +46,6 @@ from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
 from sysid.diagnosis.simulated.output_starts import settled_output
-from sysid.diagnosis.simulated.taken import FAR
 
 LEVEL = 1.0
 """Least t of a difference that counts."""
@@ -191,7 +190,7 @@ class Judge:
             F. X. Diebold, R. S. Mariano, Comparing Predictive Accuracy, Journal of
             Business & Economic Statistics 13(3), 1995.
         """
-        before, after = (self._squared(m, self._weight) for m in (worse, better))
+        before, after = (self._squared(m) for m in (worse, better))
         size = max(1, round(self.problem.block_s / (EVERY * self.problem.data.dt)))
         gained = np.where(self.valid, before - after, 0.0)
         edges = np.arange(0, len(gained), size)
@@ -206,9 +205,6 @@ class Judge:
     def fall(self, worse: Model, better: Model) -> float:
         """1 − √(Σ w² e₁² / Σ w² e₀²), what goes of the error of held-out angles [1].
 
-        With weights w of no more lateness than the better model leaves: what its
-        predictions are not late by is not what a servo's cycle makes of the worse one.
-
         Args:
             worse: the model of e₀.
             better: that of e₁.
@@ -216,24 +212,14 @@ class Judge:
         Source:
             Ours; an effect size beside the test of `t_value`.
         """
-        weight, output = self._weight, self.output
-        if isinstance(output, OutputProblem):
-            weight = output.weights(output.lateness(self.error(better)))
-        each = (self._squared(m, weight)[self.valid].sum() for m in (worse, better))
-        before, after = each
+        before, after = (self._squared(m)[self.valid].sum() for m in (worse, better))
         return 1.0 - float(np.sqrt(after / max(before, 1e-300)))
 
-    @property
-    def _weight(self) -> Float[np.ndarray, "m p"] | float:
-        """Returns the weights of the likelihood."""
-        output = self.output
-        return output.weight[1] if isinstance(output, OutputProblem) else 1.0
-
-    def _squared(
-        self, model: Model, weight: Float[np.ndarray, "m p"] | float
-    ) -> Float[np.ndarray, "m p"]:
+    def _squared(self, model: Model) -> Float[np.ndarray, "m p"]:
         """Returns w² e², of what diverges no more than counts anyway [rad²]."""
-        return weight**2 * np.minimum(self.error(model) ** 2, FAR)
+        output = self.output
+        weight = output.weight[1] if isinstance(output, OutputProblem) else 1.0
+        return weight**2 * np.minimum(self.error(model) ** 2, 1e12)
 
     def pair(self, smaller: Model, larger: Model) -> tuple[Model, Model]:
         """Returns what is compared: fits to the angle, the smaller within tolerances.

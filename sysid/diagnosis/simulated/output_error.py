@@ -132,15 +132,6 @@ class OutputProblem(Problem):
         unsure = np.hypot(late_s * self._speed(), pushed)
         return 1.0 / np.hypot(1.0, unsure / self.size)
 
-    def lateness(self, error: Float[np.ndarray, "m p"]) -> float:
-        """Returns the lateness that the error of a model leaves, at most the known [s].
-
-        Args:
-            error: of the angle [rad].
-        """
-        shown = shown_lateness(error, self.size, self._speed(), self.valid[1])
-        return min(shown, self.late_s)
-
     def _speed(self) -> Float[np.ndarray, "m p"]:
         """Returns the largest speed about every sample."""
         vel = np.abs(np.asarray(self.data.track.vel, float))

@@ -171,33 +171,9 @@ def test_an_angle_that_is_uncertain_in_motion_speaks_for_no_cause(
     problem = SimpleNamespace(data=data, known="both", block_s=4.0 * EVERY)
     judge, left = Judge(problem, None), np.where(fast, 2.0, 1.05)[:, None]
     weights = np.where(fast, weight, 1.0)[:, None]
-    judge.output = SimpleNamespace(
-        weight=np.stack([np.ones_like(weights), weights]),
-        lateness=lambda error: 1.0,
-        weights=lambda late_s: weights**late_s,
-    )
+    judge.output = SimpleNamespace(weight=np.stack([np.ones_like(weights), weights]))
     models = SimpleNamespace(), SimpleNamespace()
     judge.errors[id(models[0])] = (models[0], np.where(fast[:, None], 9.0, 1.0))
     judge.errors[id(models[1])] = (models[1], left)
     assert (judge.fall(*models) > LEAST_FALL) is counts
     assert bool(judge.t_value(*models) > LEVEL) is counts
-
-
-@pytest.mark.parametrize(("late_s", "counts"), [(1.0, False), (0.0, True)])
-def test_what_the_better_model_is_not_late_by_is_an_error_of_the_worse(
-    monkeypatch, late_s, counts
-):
-    """A direction's friction in motion: nothing that is left is a servo's cycle."""
-    monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
-    fast = (np.arange(40) % 4 == 0)[:, None]
-    data = SimpleNamespace(valid=np.ones((40, 1), bool), dt=1.0)
-    judge = Judge(SimpleNamespace(data=data, known="both"), None)
-    judge.output = SimpleNamespace(
-        lateness=lambda error: late_s if error.max() < 2.0 else 1.0,
-        weights=lambda late: np.where(fast, 0.03**late, 1.0),
-        weight=np.stack(2 * [np.where(fast, 0.03, 1.0)]),
-    )
-    models = SimpleNamespace(), SimpleNamespace()
-    for model, left in zip(models, (9.0, 1.0), strict=True):
-        judge.errors[id(model)] = (model, np.where(fast, left, 1.0))
-    assert (judge.fall(*models) > LEAST_FALL) is counts

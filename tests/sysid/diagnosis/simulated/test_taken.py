@@ -65,15 +65,3 @@ def test_an_angle_at_speed_weighs_as_repeats_show_it():
     assert np.all(alike.weight[1] > 0.5)
     assert scattered.late_s == CYCLE_S
     assert scattered.weight[1].min() < 0.6
-
-
-def test_a_model_that_is_not_late_leaves_no_lateness():
-    output = output_error(problem_with(row_s=0.005))
-    assert output is not None
-    rng = np.random.default_rng(2)
-    error = 1e-4 * rng.normal(size=output.fold.shape)
-    sized = output.with_noise(np.stack([0.0 * error, error]))
-    shown = sized.lateness(sized.size * rng.normal(size=error.shape))
-    assert shown < 0.2 * CYCLE_S
-    assert sized.lateness(np.ones_like(error)) == sized.late_s
-    assert np.all(sized.weights(0.0) >= sized.weight[1])
