@@ -24,7 +24,6 @@ from sysid.diagnosis.likelihood.whitening import (
 from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
-from sysid.diagnosis.simulated.taken import shown_lateness
 
 FAR = 1e3
 """Largest error that counts, in units of the angle's size: of unstable candidates."""
@@ -38,8 +37,6 @@ class OutputProblem(Problem):
         equations: the residuals from which its candidates come.
         stages: candidates that came from them, by the effects of the smaller model.
         seen: what was simulated; see `closed_loop`.
-        size: s, noise of an angle at rest [rad].
-        late_s: deviation of the time at which a target is taken [s].
     """
 
     channels: ClassVar[tuple[str, str]] = ("", "position")
@@ -50,8 +47,6 @@ class OutputProblem(Problem):
     equations: Problem | None = None
     stages: dict[tuple[str, ...], list] = field(default_factory=dict)
     seen: Known = field(default_factory=Known)
-    size: float = 1.0
-    late_s: float = CYCLE_S
 
     @property
     def reading_noise(self) -> float:
@@ -86,7 +81,11 @@ class OutputProblem(Problem):
     def with_noise(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes the noise from the repeats of the error, else from its neighbours.
 
-        Weights are those of `weights`, with as much lateness as repeats show.
+        When a servo takes a target is known to its cycle, so an angle that moves at
+        speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²),
+        with the largest |v| of three samples about it: a fast servo starts between two.
+        What others push is known as well as rows sample their motion and as none of
+        them is missing: `JointTrack.pushed`, u, may move this joint by u / kp more.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -97,45 +96,23 @@ class OutputProblem(Problem):
         Source:
             Ours; as `Problem.with_noise`.
         """
-        valid = self.valid[1]
+        valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
+        speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
+        late = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
+        unsure = np.hypot(late, self._pushed()[rows])
         if self.repeat:
             series, counts = self.repeat.differences(raw[1], valid)
             size = bulk_deviation(series[counts]) if counts.any() else 1.0
-            late_s = shown_lateness(series, size, self._speed(), counts)
+            weight = 1.0 / np.hypot(1.0, unsure / size)
+            found = self.repeat.differences(weight * raw[1], valid)
+            noise = autoregressive(*found)
         else:
             readings = np.array([self.reading_noise**2, 0.0, 0.0])
             size = difference_noise(raw[1], valid, readings, band_steps=0.0)
-            late_s = CYCLE_S
-        sized = replace(self, size=size, late_s=late_s)
-        weight, noise = sized.weights(late_s), Noise(np.zeros(0), size)
-        if self.repeat:
-            noise = autoregressive(*self.repeat.differences(weight * raw[1], valid))
+            weight = 1.0 / np.hypot(1.0, unsure / size)
+            noise = Noise(np.zeros(0), size)
         weights = np.stack([np.ones_like(weight), weight])
-        return replace(sized, noise=(self.noise[0], noise), weight=weights)
-
-    def weights(self, late_s: float) -> Float[np.ndarray, "m p"]:
-        """Weights w = 1 / √(1 + (u / s)²) of angles that are uncertain by u [1].
-
-        When a servo takes a target is known to its cycle, so an angle that moves at
-        speed v is uncertain by Δ |v|, with the largest |v| of three samples about it: a
-        fast servo starts between two. What others push is known as well as rows sample
-        their motion and as none of them is missing: `JointTrack.pushed`, p, may move
-        this joint by p / kp more, u² = (Δ v)² + (p / kp)².
-
-        Args:
-            late_s: Δ, deviation of the time at which a target is taken [s].
-
-        Source:
-            Ours.
-        """
-        pushed = self._pushed()[sample_rows(len(self.data.track.cmd))]
-        unsure = np.hypot(late_s * self._speed(), pushed)
-        return 1.0 / np.hypot(1.0, unsure / self.size)
-
-    def _speed(self) -> Float[np.ndarray, "m p"]:
-        """Returns the largest speed about every sample."""
-        vel = np.abs(np.asarray(self.data.track.vel, float))
-        return maximum_filter1d(vel[sample_rows(len(vel))], 3, axis=0)
+        return replace(self, noise=(self.noise[0], noise), weight=weights)
 
     def _pushed(self) -> Float[np.ndarray, "t p"]:
         """Returns how far pushes of others, as sampled, may lead the angle astray."""
