@@ -4,6 +4,7 @@ The true effect removes its own error, from every residual, at parameters that t
 can have. A wrong one that comes near
 
 - leaves an error of the simulated motion that is more than noise,
+- leaves one that depends on where the joint is (`dependence`),
 - needs a parameter beyond the range of the effect,
 - does not bring the simulated motion nearer to the measured one, or
 - moves nominal parameters of the simulation far off their priors.
@@ -29,12 +30,14 @@ from sysid.diagnosis.fits.candidate import (
 )
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.likelihood.whitening import bulk_deviation
+from sysid.diagnosis.replay.band import sample_rows
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.simulated.output_starts import settled_output
+from sysid.diagnosis.verdict.dependence import depends_on
 
 OUTLIER_SD = 8.0
 """Standard deviations of the noise that no sample of it reaches."""
@@ -68,6 +71,7 @@ def unexplained_signs(found: Search) -> list[str]:
     left = _left(found)
     texts = [
         *_remaining(left),
+        *_depending(left),
         *_no_nearer(found),
         *_at_bounds(found),
         *_off_prior(found),
@@ -105,6 +109,19 @@ def _remaining(left: _Left) -> list[str]:
             times = np.sqrt(after)
             texts.append(f"the {name} residual is {times:.1f} times the noise")
     return texts
+
+
+def _depending(left: _Left) -> list[str]:
+    """Finds an error of the simulated angle that depends on the angle."""
+    problem = left.problem
+    if not isinstance(problem, OutputProblem):
+        return []
+    track, k = problem.data.track, problem.channels.index("position")
+    error = problem.raw(left.best.fit.theta[None])[0, k] / problem.noise[k].deviation
+    angle = np.asarray(track.pos, float)[sample_rows(len(track.cmd))]
+    if not depends_on(error, angle, problem.valid[k]):
+        return []
+    return ["the position residual depends on the position"]
 
 
 def _no_nearer(found: Search) -> list[str]:

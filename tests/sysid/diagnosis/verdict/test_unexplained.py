@@ -24,6 +24,7 @@ from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.verdict.unexplained import (
+    _depending,
     _jumps,
     _Left,
     _left,
@@ -101,7 +102,9 @@ def test_a_motion_that_the_simulation_does_not_follow_is_unexplained(repeats):
     problem, base = settled(problem if repeats else replace(problem, repeat=None))
     parts = (problem.samples, Judge(problem, base))
     found = Search(problem, base, base, {}, {}, [], *parts)
-    assert any("the position residual is" in x for x in unexplained_signs(found))
+    signs = unexplained_signs(found)
+    assert any("the position residual is" in x for x in signs)
+    assert any("the position residual depends on the position" in x for x in signs)
 
 
 @pytest.mark.parametrize("repeats", [True, False])
@@ -112,6 +115,7 @@ def test_a_motion_without_effects_is_followed(searched, repeats):
     left = _left(Search(problem, base, base, {}, {}, [], *parts))
     assert left.problem.channels[1] == "position"
     assert left.best.errors[1] < 1.3
+    assert _depending(left) == []
 
 
 def test_sizes_at_the_end_of_their_range_explain_nothing(searched):
