@@ -115,7 +115,7 @@ def test_an_error_that_becomes_all_but_noise_matters(angle, repeat, matters):
 def test_the_noise_of_an_encoder_is_known_without_repeats(monkeypatch, left, matters):
     """Coarse targets: 2.8 times it is `unexplained`, and the grid leaves 1.9."""
     monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
-    judge = Said(ENOUGH, 4.5, repeat=False, fall=0.16)
+    judge = Said(ENOUGH, 4.5, repeat=False, fall=0.6 * LEAST_FALL)
     judge.angle = (2.8, left)
     assert says(judge) == matters
 
