@@ -19,15 +19,12 @@ import flax.struct
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Bool, Float, Shaped
+from jaxtyping import Array, Bool, Float
 
 from envs.actuator.effect import EffectKind, Params, Stage, Substep
 from sysid.drive import JointDrive
 
 NAME = "cascade"
-SETTLED = 4.6
-"""Time constants of a low-pass after which a hundredth of a step is left, ln 100."""
-
 BEFORE = "torque_limit"
 """Effect before which it acts: behind what changes the error, in front of limits."""
 
@@ -169,36 +166,6 @@ def begun(
         value=jnp.where(anew, torque, state.value),
         anew=jnp.where(anew, 1.0, state.anew),
     )
-
-
-def begins_anew(
-    drive: JointDrive, resumed: Shaped[np.ndarray, "t p"], dt: float
-) -> Shaped[np.ndarray, "t p"]:
-    """Where a simulation begins anew: until its command is that of the drive.
-
-    Of a command that still lacks a lost target u is wrong, and so were z = τ − u.
-
-        T + 4.6 / 2π f_c  behind the targets that are known again
-
-    Args:
-        drive: with the nominal delay T [s] and low-pass f_c [Hz].
-        resumed: 1 where targets are known again, else 0.
-        dt: step of the grid [s].
-
-    Returns:
-        1 there and until then, else 0; the same without a cascade.
-
-    Source:
-        Ours.
-    """
-    if drive.cascade is None:
-        return resumed
-    late = drive.parameter("transport_delay", "delay_s", 0.0)
-    slow = 2.0 * np.pi * drive.parameter("lowpass_cutoff", "cutoff_hz", np.inf)
-    rows = int(np.ceil((late + SETTLED / slow) / dt))
-    last = np.cumsum(resumed, 0)
-    before = np.pad(last, [(rows + 1, 0), (0, 0)])[: len(last)]
-    return last > before
 
 
 KIND = EffectKind(

@@ -54,7 +54,7 @@ class Track(Motion):
     Attributes:
         cmd: target, mean over the step that ends there [rad].
         held, sent: the last targets (s) of a step, see `measured.segments.Piece`.
-        resumed: 1 where a simulation begins anew, see `measured.segments.Piece`.
+        resumed: 1 where a simulation begins anew, see `validity.begins_anew`.
         gravity: in the frame of the mount [m/s²].
         payload_kg: nominal mass of the payload [kg].
         kp, kd: nominal gains [N·m/rad], [N·m·s/rad].

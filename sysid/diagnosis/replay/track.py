@@ -13,7 +13,7 @@ from sysid.diagnosis.measured.in_time import Sensor, in_time
 from sysid.diagnosis.measured.resampling import smoothed
 from sysid.diagnosis.measured.segments import Piece, grid_step_s, pieces_of
 from sysid.diagnosis.replay.band import BAND_STEPS, sample_rows
-from sysid.diagnosis.replay.cascade import begins_anew, cascade_of
+from sysid.diagnosis.replay.cascade import cascade_of
 from sysid.diagnosis.replay.motion import JointTrack, Track
 from sysid.diagnosis.replay.neighbours import pulling
 from sysid.diagnosis.replay.noise import band_noise, reading_noise
@@ -21,7 +21,7 @@ from sysid.diagnosis.replay.timing_uncertainty import (
     push_uncertainty,
     residual_uncertainty,
 )
-from sysid.diagnosis.replay.validity import supported
+from sysid.diagnosis.replay.validity import begins_anew, supported
 from sysid.drive import JointDrive
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism

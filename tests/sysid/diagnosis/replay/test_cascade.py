@@ -9,13 +9,7 @@ import pytest
 from support.cascade_rig import exact_log, problem_with, stand_of
 from support.plain_servo import problem_with as plain_problem
 
-from benchmarks.diagnosis.hidden.believed import believed
-from sysid.diagnosis.replay.cascade import (
-    Integral,
-    begins_anew,
-    follow,
-    with_cascade,
-)
+from sysid.diagnosis.replay.cascade import Integral, follow, with_cascade
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.logs.log import make_log
 
@@ -144,19 +138,6 @@ def test_behind_a_gap_the_simulation_begins_with_the_torque_there():
 
     assert most(resumed) < 2.0 * ANGLE_RAD
     assert most(0.0 * resumed) > 20.0 * ANGLE_RAD
-
-
-def test_it_begins_anew_until_its_command_is_known():
-    """Targets are lost behind which a step has been: the low-pass forgets it first."""
-    stand = stand_of(2)
-    drive = believed(stand).drives["shoulder"]
-    resumed = np.zeros((100, 1))
-    resumed[[30, 60]] = 1.0
-    begins = np.flatnonzero(begins_anew(drive, resumed, 0.005))
-    rows = math.ceil((0.004 + 4.6 / (2.0 * math.pi * 15.0)) / 0.005)
-    assert begins.tolist() == [k + i for k in (30, 60) for i in range(rows + 1)]
-    two_gains = replace(drive, cascade=None)
-    assert begins_anew(two_gains, resumed, 0.005) is resumed
 
 
 def test_a_step_that_was_lost_is_soon_forgotten():
