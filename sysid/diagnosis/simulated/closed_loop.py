@@ -24,11 +24,12 @@ from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.replay import band, cascade
 from sysid.diagnosis.replay.beside import ages, beside
-from sysid.diagnosis.replay.effects import ENTER, KINDS
+from sysid.diagnosis.replay.effects import ENTER
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.side_by_side import side_by_side
+from sysid.diagnosis.simulated import play
 from sysid.diagnosis.simulated.part_targets import part_targets
 from sysid.diagnosis.simulated.windows import cut_windows
 
@@ -154,11 +155,13 @@ def _simulated(
     gain, mass = nuisance.effort_gain[None, :], nuisance.mass[None, :]
     cut = cut_windows(track, jnp.moveaxis(targets, 0, -1), window, dt * substeps)
     effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
-    model = [(KINDS[n], p) for n, p in effects.items()]
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
+    damped = 0.5 * (1.0 - float(driven))
 
     def chain(now):
+        here = play.with_motor(effects, nuisance, now.inertia, damped)
+        model = [(play.KINDS[n], p) for n, p in here.items()]
         return (*model, (ENTER, {**enters, "effort": gain * now.effort}))
 
     def act(now, target, states, at, qd, away):
@@ -172,7 +175,7 @@ def _simulated(
         # Angles at its middle, speeds at its ends, damped by their mean: second order.
         middle = q + 0.5 * dt * qd
         states, x = act(now, target, states, middle, qd, middle - now.pos + turned)
-        x = replace(x, damping=0.5 * x.damping * (1.0 - float(driven)))
+        x = replace(x, damping=damped * x.damping)
         _, qd = joint_step(x, mass * now.inertia, dt)
         q = middle + 0.5 * dt * qd
         # The chain read the encoder before the joint moved on.

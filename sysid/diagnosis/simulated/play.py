@@ -1,0 +1,142 @@
+"""Play whose motor has an inertia, as the simulation of one joint needs it.
+
+The catalogue's play lets a free motor follow its servo at once: that takes no parameter
+and little of a hand's time. But a light link hangs behind most gears, and half of all
+that turns may be the motor: it crosses the gap as its inertia lets it, and rings there,
+for what damps motor and link together need not damp the motor alone. What is left of
+an angle by a motor without inertia is as large as what a play makes of it.
+"""
+
+from collections.abc import Mapping
+
+import flax.struct
+import jax.numpy as jnp
+from jaxtyping import Array, Float
+
+from envs.actuator.effect import EffectKind, Params, Stage, Substep
+from sysid.diagnosis.replay.effects import KINDS as EFFECTS
+from sysid.diagnosis.replay.link import MOST_ROTOR
+from sysid.diagnosis.replay.model import Nuisance
+
+NAME = "backlash"
+
+
+@flax.struct.dataclass
+class Play:
+    """Motor against joint after a substep, as far as the joint's speed does not matter.
+
+    Attributes:
+        lead: angle of the motor less that of the joint [rad].
+        ahead: speed of the motor less that of the joint [rad/s].
+        wall: 1 or −1 where the motor touches, 0 between the walls.
+        heavy: H, momentum per speed and time that the motor has and its servo damps
+            [N·m·s/rad]; 0 before the first substep.
+        base: H v_m + τ [N·m].
+    """
+
+    lead: Float[Array, "*j"]
+    ahead: Float[Array, "*j"]
+    wall: Float[Array, "*j"]
+    heavy: Float[Array, "*j"]
+    base: Float[Array, "*j"]
+
+
+def moved(params: Params, play: Play, speed: Float[Array, "*j"], dt: float) -> Play:
+    """Finishes a substep with the speed v' that the joint has at its end.
+
+        at a wall   v_m' = v',   f = H (v_m − v') + τ,   leaves it where f pulls
+        free        v_m' = v_m + τ / H,   lead' = lead + Δt (v_m' − v')
+
+    Args:
+        params: gap [rad].
+        play: before, with H and H v_m + τ of the substep.
+        speed: v' [rad/s].
+        dt: Δt [s].
+
+    Returns:
+        Angle, speed and wall at the end of the substep.
+
+    Source:
+        Ours; a wall takes all relative speed: M. Nordin, P.-O. Gutman, Controlling
+        Mechanical Systems with Backlash: a Survey, Automatica 38(10), 2002.
+    """
+    half = 0.5 * params["gap_rad"]
+    at_wall = (play.wall != 0.0) | (half <= 0.0)
+    pushes = (play.base - play.heavy * speed) * play.wall > 0.0
+    begins = play.heavy <= 0.0
+    own = play.base / jnp.where(begins, 1.0, play.heavy)
+    ahead = jnp.where(at_wall | begins, 0.0, own - speed)
+    lead = play.lead + dt * ahead
+    hits = ~at_wall & (jnp.abs(lead) >= half) & (lead * ahead > 0.0)
+    wall = jnp.where(at_wall, play.wall * pushes, hits * jnp.sign(lead))
+    return play.replace(lead=jnp.clip(lead, -half, half), ahead=ahead, wall=wall)
+
+
+def _encoder(params: Params, play: Play, x: Substep, dt: float):
+    """The encoder turns with the motor."""
+    play = moved(params, play, x.qd, dt)
+    encoder, speed = x.encoder + play.lead, x.encoder_speed + play.ahead
+    return play, x.replace(encoder=encoder, encoder_speed=speed)
+
+
+def _transmission(params: Params, play: Play, x: Substep, dt: float):
+    """Passes torque on at a wall, with the momentum of a blow; else frees the link.
+
+    At a wall motor and joint turn as one: I (v' − v) = J (v_m − v) + Δt (τ + …).
+    """
+    own = params["motor_inertia_kgm2"]
+    heavy = own / dt + params["damped"] * x.damping
+    play = play.replace(heavy=heavy, base=heavy * (x.qd + play.ahead) + x.torque)
+    free = (play.wall == 0.0) & (params["gap_rad"] > 0.0)
+    return play, x.replace(
+        torque=jnp.where(free, 0.0, x.torque + heavy * play.ahead),
+        damping=jnp.where(free, 0.0, x.damping),
+        inertia=x.inertia - jnp.where(free, own, 0.0),
+    )
+
+
+def _rest(params: Params, target, q, dt) -> Play:
+    """In the middle of the gap, as fast as the joint."""
+    none = jnp.zeros_like(q)
+    return Play(none, none, none, none, none)
+
+
+KIND = EffectKind(
+    name=NAME,
+    equation="J v̇_m = τ between the walls, q_m − q ∈ [−b/2, b/2]",
+    parameters={},
+    acts={Stage.ENCODER: _encoder, Stage.TRANSMISSION: _transmission},
+    confusable_with={},
+    source="M. Nordin, P.-O. Gutman, Controlling Mechanical Systems with Backlash: "
+    "a Survey, Automatica 38(10), 2002",
+    init=_rest,
+)
+"""Stands for the catalogue's play in a simulation of one joint."""
+
+KINDS = EFFECTS | {NAME: KIND}
+"""Effects as they act in a simulation."""
+
+
+def with_motor(
+    effects: Mapping[str, Params],
+    nuisance: Nuisance,
+    inertia: Float[Array, "p 1"],
+    damped: float,
+) -> dict[str, Params]:
+    """Adds J = min(J_rotor, 0.9 μ I) and the damping to the parameters of a play.
+
+    Args:
+        effects: parameters by name; without a play they stay as they are.
+        nuisance: with the rotor J_rotor [kg·m²] and the factor μ of masses.
+        inertia: I, of the joint with all that it carries [kg·m²].
+        damped: share of the servo's damping that a substep takes implicitly [1].
+
+    Source:
+        Ours; the rotor that `replay.link` has, too.
+    """
+    if NAME not in effects:
+        return dict(effects)
+    most = MOST_ROTOR * nuisance.mass[None, :] * inertia
+    own = jnp.minimum(nuisance.rotor[None, :], most)
+    more = {"motor_inertia_kgm2": own, "damped": jnp.asarray(damped)}
+    return {**effects, NAME: {**effects[NAME], **more}}
