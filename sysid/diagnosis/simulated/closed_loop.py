@@ -157,11 +157,9 @@ def _simulated(
     effects = cascade.with_cascade(effects, cut.track.cascade, nuisance.k_int[None, :])
     kp, kd = cut.track.kp[:, None], cut.track.kd[:, None]
     enters = {"measured": jnp.asarray(float(driven)), "ripple": jnp.zeros(())}
-    damped = 0.5 * (1.0 - float(driven))
 
     def chain(now):
-        here = play.with_motor(effects, nuisance, now.inertia, damped)
-        model = [(play.KINDS[n], p) for n, p in here.items()]
+        model = play.with_motor(effects, nuisance, now.inertia, driven)
         return (*model, (ENTER, {**enters, "effort": gain * now.effort}))
 
     def act(now, target, states, at, qd, away):
@@ -175,7 +173,7 @@ def _simulated(
         # Angles at its middle, speeds at its ends, damped by their mean: second order.
         middle = q + 0.5 * dt * qd
         states, x = act(now, target, states, middle, qd, middle - now.pos + turned)
-        x = replace(x, damping=damped * x.damping)
+        x = replace(x, damping=0.5 * x.damping * (1.0 - float(driven)))
         _, qd = joint_step(x, mass * now.inertia, dt)
         q = middle + 0.5 * dt * qd
         # The chain read the encoder before the joint moved on.

@@ -14,7 +14,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from envs.actuator.effect import EffectKind, Params, Stage, Substep
-from sysid.diagnosis.replay.effects import KINDS as EFFECTS
+from sysid.diagnosis.replay.effects import KINDS
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.model import Nuisance
 
@@ -113,30 +113,33 @@ KIND = EffectKind(
 )
 """Stands for the catalogue's play in a simulation of one joint."""
 
-KINDS = EFFECTS | {NAME: KIND}
-"""Effects as they act in a simulation."""
-
 
 def with_motor(
     effects: Mapping[str, Params],
     nuisance: Nuisance,
-    inertia: Float[Array, "p 1"],
-    damped: float,
-) -> dict[str, Params]:
-    """Adds J = min(J_rotor, 0.9 μ I) and the damping to the parameters of a play.
+    inertia: Float[Array, "p #c"],
+    driven: bool,
+) -> list[tuple[EffectKind, Params]]:
+    """Effects as they act in a simulation: a play with J = min(J_rotor, 0.9 μ I).
 
     Args:
-        effects: parameters by name; without a play they stay as they are.
+        effects: parameters by name, in the order of the chain.
         nuisance: with the rotor J_rotor [kg·m²] and the factor μ of masses.
         inertia: I, of the joint with all that it carries [kg·m²].
-        damped: share of the servo's damping that a substep takes implicitly [1].
+        driven: whether the logged effort moves the motor, which no servo damps then;
+            else speeds are damped by their mean, as those of the joint are.
+
+    Returns:
+        Kinds and parameters for `chain_step`.
 
     Source:
         Ours; the rotor that `replay.link` has, too.
     """
-    if NAME not in effects:
-        return dict(effects)
     most = MOST_ROTOR * nuisance.mass[None, :] * inertia
     own = jnp.minimum(nuisance.rotor[None, :], most)
-    more = {"motor_inertia_kgm2": own, "damped": jnp.asarray(damped)}
-    return {**effects, NAME: {**effects[NAME], **more}}
+    damped = jnp.asarray(0.5 * (1.0 - float(driven)))
+    more = {"motor_inertia_kgm2": own, "damped": damped}
+    return [
+        (KIND, {**p, **more}) if n == NAME else (KINDS[n], p)
+        for n, p in effects.items()
+    ]
