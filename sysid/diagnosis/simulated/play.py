@@ -8,6 +8,7 @@ an angle by a motor without inertia is as large as what a play makes of it.
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 
 import flax.struct
 import jax.numpy as jnp
@@ -69,14 +70,14 @@ def moved(params: Params, play: Play, speed: Float[Array, "*j"], dt: float) -> P
     lead = play.lead + dt * ahead
     hits = ~at_wall & (jnp.abs(lead) >= half) & (lead * ahead > 0.0)
     wall = jnp.where(at_wall, play.wall * pushes, hits * jnp.sign(lead))
-    return play.replace(lead=jnp.clip(lead, -half, half), ahead=ahead, wall=wall)
+    return replace(play, lead=jnp.clip(lead, -half, half), ahead=ahead, wall=wall)
 
 
 def _encoder(params: Params, play: Play, x: Substep, dt: float):
     """The encoder turns with the motor."""
     play = moved(params, play, x.qd, dt)
     encoder, speed = x.encoder + play.lead, x.encoder_speed + play.ahead
-    return play, x.replace(encoder=encoder, encoder_speed=speed)
+    return play, replace(x, encoder=encoder, encoder_speed=speed)
 
 
 def _transmission(params: Params, play: Play, x: Substep, dt: float):
@@ -86,9 +87,10 @@ def _transmission(params: Params, play: Play, x: Substep, dt: float):
     """
     own = params["motor_inertia_kgm2"]
     heavy = own / dt + params["damped"] * x.damping
-    play = play.replace(heavy=heavy, base=heavy * (x.qd + play.ahead) + x.torque)
+    play = replace(play, heavy=heavy, base=heavy * (x.qd + play.ahead) + x.torque)
     free = (play.wall == 0.0) & (params["gap_rad"] > 0.0)
-    return play, x.replace(
+    return play, replace(
+        x,
         torque=jnp.where(free, 0.0, x.torque + heavy * play.ahead),
         damping=jnp.where(free, 0.0, x.damping),
         inertia=x.inertia - jnp.where(free, own, 0.0),
@@ -117,7 +119,7 @@ KIND = EffectKind(
 def with_motor(
     effects: Mapping[str, Params],
     nuisance: Nuisance,
-    inertia: Float[Array, "p #c"],
+    inertia: Float[Array, "*#c"],
     driven: bool,
 ) -> list[tuple[EffectKind, Params]]:
     """Effects as they act in a simulation: a play with J = min(J_rotor, 0.9 μ I).
