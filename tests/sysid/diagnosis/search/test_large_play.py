@@ -7,7 +7,6 @@ from support.plain_servo import problem_with
 from benchmarks.diagnosis.battery import run_task
 from benchmarks.diagnosis.plan import wide_plan
 from sysid.diagnosis.fits import space
-from sysid.diagnosis.search import judge
 
 NARROW = {"rad": (0.004, 0.01, 0.025, 0.06, 0.15, 0.4)}
 """Plays of at most 4 % of the motion."""
@@ -38,9 +37,3 @@ def test_a_large_play_is_found():
 def test_from_small_ones_alone_it_is_not(monkeypatch):
     monkeypatch.setattr(space, "_GRIDS", space._GRIDS | NARROW)
     assert said()[1] != ("backlash",)
-
-
-@pytest.mark.slow
-def test_a_simulation_that_is_still_on_its_way_does_not_explain_it(monkeypatch):
-    monkeypatch.setattr(judge, "CONVERGED", 10)
-    assert said() == ("unexplained", ("backlash",))
