@@ -19,7 +19,9 @@ the logged effort shows to that model, as surely as it does: free ones would do 
 simulation what the effect does. The likelihood need not gain where
 repeats show that the logged effort has no other explanation: what parameters a little
 out of their tolerances hide of the angle, as a servo's damping hides friction, they do
-not hide of the effort, whose error then must fall by that share.
+not hide of the effort, whose error then must fall by `LEAST_FALL_OF_EFFORT`. An angle
+that does not show the cause need not come nearer by `LEVEL` either, which chance would
+decide: it must come nearer at all.
 """
 
 from dataclasses import replace
@@ -262,8 +264,11 @@ class Judge:
         """Whether the larger model predicts angles better than the smaller one."""
         if not self.sees:
             return True
-        needed = self.shows(smaller, larger) or self._explains(smaller, larger)
-        return needed and self.t_value(*self.pair(smaller, larger)) > LEVEL
+        explained = self._explains(smaller, larger)
+        # Where the effort is the proof, the angle need only not speak against it.
+        least = 0.0 if explained else LEVEL
+        needed = explained or self.shows(smaller, larger)
+        return needed and self.t_value(*self.pair(smaller, larger)) > least
 
     def shows(self, smaller: Model, larger: Model) -> bool:
         """Whether the likelihood of the angle gains enough with the larger model."""

@@ -86,7 +86,7 @@ def test_a_difference_that_is_sure_but_small_is_no_cause():
     assert says(Said(ENOUGH, 9.0, fall=1.1 * LEAST_FALL))
     small = Said(ENOUGH, 9.0, fall=0.9 * LEAST_FALL)
     assert not says(small)
-    nothing, cause = SimpleNamespace(), SimpleNamespace(gain=ENOUGH)
+    nothing, cause = (SimpleNamespace(errors=np.ones(2), gain=ENOUGH) for _ in range(2))
     assert small.prefers(nothing, cause)  # beside a cause that counts
 
 
@@ -136,6 +136,13 @@ def test_such_an_effort_matters_itself_where_little_goes_of_the_angle(
     assert says(Said(6.4, t, fall=0.02), before, after) is counts
 
 
+def test_an_angle_that_does_not_show_it_need_only_come_no_farther():
+    """Viscous friction behind gains known to half: t of 1.05, or by chance of 0.9."""
+    assert says(Said(-0.7, 0.1 * LEVEL, fall=0.0), before=5.8, after=1.0)
+    assert not says(Said(-0.7, 0.1 * LEVEL, fall=0.0), before=5.8, after=2.5)
+    assert not says(Said(ENOUGH, 0.1 * LEVEL), before=1.8, after=1.0)
+
+
 def test_without_repeats_next_to_nothing_must_remain():
     """A torque limit: 17,495 times what neighbours do not share becomes 50."""
     assert says(Said(1.4, 7.4, repeat=False), before=17_495.0, after=50.0)
@@ -145,7 +152,7 @@ def test_without_repeats_next_to_nothing_must_remain():
 @pytest.mark.parametrize(
     "changed",
     [
-        {"t": 0.5 * LEVEL},
+        {"t": -0.5 * LEVEL},
         {"repeat": False, "after": 8.0},
         {"effort": False},
         {"after": 100.0},
