@@ -56,7 +56,7 @@ def test_a_scale_that_is_first_is_suspected(rejected, gains, found, monkeypatch)
     ("before", "after", "causes", "solved"),
     [
         (2.05, 0.4, (), True),
-        (2.05, 1.7, (), False),  # no fifth of its square goes
+        (2.05, 1.7, (), False),  # no quarter of its square goes
         (9.0, 4.0, (), False),  # too much is left
         (2.05, 0.4, ("joint_coupling",), False),  # by a cause of its own
     ],
