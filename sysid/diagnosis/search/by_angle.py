@@ -8,9 +8,12 @@ it names, so much of the angle's error has to go, however little remains.
 """
 
 from sysid.diagnosis.fits.candidate import Model
-from sysid.diagnosis.search.judge import LEAST_FALL, Judge
+from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.simulated.output_error import OutputProblem
+
+FAR_LESS = 0.25
+"""Least share of the angle's error that goes with the answer of such a search."""
 
 
 def nearest(judge: Judge, model: Model) -> Model:
@@ -30,7 +33,7 @@ def explains(before: float, after: float) -> bool:
         after: the same with the causes [1].
     """
     fall = 1.0 - (after / before) ** 0.5
-    return fall > LEAST_FALL and not leaves_much(before, after)
+    return fall > FAR_LESS and not leaves_much(before, after)
 
 
 def unsolved(

@@ -265,7 +265,7 @@ class Judge:
         if not self.sees:
             return True
         explained = self._explains(smaller, larger)
-        # Where the effort is the proof, the angle need only not speak against it.
+        # Where the effort is the proof, the angle need only come nearer at all.
         least = 0.0 if explained else LEVEL
         needed = explained or self.shows(smaller, larger)
         return needed and self.t_value(*self.pair(smaller, larger)) > least

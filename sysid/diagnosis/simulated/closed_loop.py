@@ -1,4 +1,4 @@
-"""Simulation of one joint along its records, as training simulates it.
+"""Simulation of one joint along its records, as training simulates it but for a play.
 
 Chain and joint are integrated from a measured state, at substeps that are short enough
 for their own lag not to count. Where the servo's law is known, a candidate follows the
@@ -192,12 +192,12 @@ def _simulated(
         states, q, qd, y = carry
         anew = row[3][:, None] > 0.0
         place = partial(placed, before[0], target[0], states, anew)
-        q, qd = jax.lax.cond(anew.any(), place, lambda *moved: moved, q, qd)
+        q, put = jax.lax.cond(anew.any(), place, lambda *moved: moved, q, qd)
+        states, qd = play.begun(states, anew, before[0].vel, (qd, put))
         states = _begun(cut.track, before[0], nuisance, effects, states, anew)
 
         def within(i, c):
-            share = (i + 0.5) / substeps
-            now = jax.tree.map(lambda a, b: a + share * (b - a), before, after)
+            now = _between(before, after, (i + 0.5) / substeps)
             return substep(c, now, target[i * len(target) // substeps])
 
         carry = jax.lax.fori_loop(0, substeps, within, (states, q, qd, y))
@@ -210,6 +210,11 @@ def _simulated(
     start = (rest(moving[0], dt), *moving, q0)
     rows = (cut.before, cut.motion, cut.target, cut.resumed, cut.number)
     return _joined(jax.lax.scan(step, start, rows)[1], track)
+
+
+def _between(before, after, share):
+    """Interpolates what is known at two rows."""
+    return jax.tree.map(lambda a, b: a + share * (b - a), before, after)
 
 
 def _joined(angles: Float[Array, "w l c"], track: Track) -> Float[Array, "t p c"]:

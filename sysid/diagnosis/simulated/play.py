@@ -3,16 +3,17 @@
 The catalogue's play lets a free motor follow its servo at once: that takes no parameter
 and little of a hand's time. But a light link hangs behind most gears, and half of all
 that turns may be the motor: it crosses the gap as its inertia lets it, and rings there,
-for what damps motor and link together need not damp the motor alone. What is left of
-an angle by a motor without inertia is as large as what a play makes of it.
+for what damps motor and link together need not damp the motor alone. A motor without
+inertia may leave more than half of what a play makes of an angle.
 """
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import flax.struct
 import jax.numpy as jnp
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from envs.actuator.effect import EffectKind, Params, Stage, Substep
 from sysid.diagnosis.replay.effects import KINDS
@@ -20,6 +21,7 @@ from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.model import Nuisance
 
 NAME = "backlash"
+SPRING = "compliance"
 
 
 @flax.struct.dataclass
@@ -119,10 +121,13 @@ KIND = EffectKind(
 def with_motor(
     effects: Mapping[str, Params],
     nuisance: Nuisance,
-    inertia: Float[Array, "*#c"],
+    inertia: Float[Array, " p #c"],
     driven: bool,
 ) -> list[tuple[EffectKind, Params]]:
     """Effects as they act in a simulation: a play with J = min(J_rotor, 0.9 μ I).
+
+    A spring has a motor of its own, which cannot be taken off the link twice: beside
+    one the play is the catalogue's.
 
     Args:
         effects: parameters by name, in the order of the chain.
@@ -142,6 +147,42 @@ def with_motor(
     damped = jnp.asarray(0.5 * (1.0 - float(driven)))
     more = {"motor_inertia_kgm2": own, "damped": damped}
     return [
-        (KIND, {**p, **more}) if n == NAME else (KINDS[n], p)
+        (KIND, {**p, **more}) if n == NAME and SPRING not in effects else (KINDS[n], p)
         for n, p in effects.items()
     ]
+
+
+def begun(
+    states: tuple[Any, ...],
+    anew: Bool[Array, " p #c"],
+    read: Float[Array, " p #c"],
+    speeds: tuple[Float[Array, " p c"], Float[Array, " p c"]],
+) -> tuple[tuple[Any, ...], Float[Array, " p c"]]:
+    """Where a simulation begins anew: between the walls the motor is as fast as read.
+
+    Its encoder does not show the speed of the link then, which keeps its own. At a wall
+    both change theirs, and with them the momentum H v_m.
+
+    Args:
+        states: of the chain.
+        anew: where it begins.
+        read: speed of the encoder [rad/s].
+        speeds: of the link, before it was put to what was read, and then [rad/s].
+
+    Returns:
+        States, and the speed of the link [rad/s].
+
+    Source:
+        Ours.
+    """
+    before, speed = speeds
+    made = []
+    for state in states:
+        if isinstance(state, Play):
+            free = anew & (state.wall == 0.0) & (state.heavy > 0.0)
+            speed = jnp.where(free, before, speed)
+            base = state.base + jnp.where(anew, state.heavy * (speed - before), 0.0)
+            base = jnp.where(free, state.heavy * read, base)
+            state = replace(state, base=base)
+        made.append(state)
+    return tuple(made), speed

@@ -112,14 +112,17 @@ def _remaining(left: _Left) -> list[str]:
 
 
 def _depending(left: _Left) -> list[str]:
-    """Finds an error of the simulated angle that depends on the angle."""
-    problem = left.problem
+    """Finds an error of the simulated angle that depends on that angle.
+
+    What was read has the error's own noise in it, which a joint at rest would show.
+    """
+    problem, theta = left.problem, left.best.fit.theta[None]
     if not isinstance(problem, OutputProblem):
         return []
     track, k = problem.data.track, problem.channels.index("position")
-    error = problem.raw(left.best.fit.theta[None])[0, k] / problem.noise[k].deviation
-    angle = np.asarray(track.pos, float)[sample_rows(len(track.cmd))]
-    if not depends_on(error, angle, problem.valid[k]):
+    error = problem.raw(theta, weigh=False)[0, k]
+    angle = np.asarray(track.pos, float)[sample_rows(len(track.cmd))] - error
+    if not depends_on(problem.weight[k] * error, angle, problem.valid[k]):
         return []
     return ["the position residual depends on the position"]
 

@@ -136,9 +136,10 @@ def test_such_an_effort_matters_itself_where_little_goes_of_the_angle(
     assert says(Said(6.4, t, fall=0.02), before, after) is counts
 
 
-def test_an_angle_that_does_not_show_it_need_only_come_no_farther():
+def test_an_angle_that_does_not_show_it_need_only_come_nearer_at_all():
     """Viscous friction behind gains known to half: t of 1.05, or by chance of 0.9."""
     assert says(Said(-0.7, 0.1 * LEVEL, fall=0.0), before=5.8, after=1.0)
+    assert not says(Said(-0.7, 0.0, fall=0.0), before=5.8, after=1.0)
     assert not says(Said(-0.7, 0.1 * LEVEL, fall=0.0), before=5.8, after=2.5)
     assert not says(Said(ENOUGH, 0.1 * LEVEL), before=1.8, after=1.0)
 

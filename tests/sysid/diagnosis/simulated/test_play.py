@@ -1,5 +1,7 @@
 """A simulated play against a motor and a link that are integrated here."""
 
+from dataclasses import replace
+
 import jax.numpy as jnp
 import numpy as np
 import pytest
@@ -56,6 +58,30 @@ def test_a_motor_crosses_its_gap_as_its_inertia_lets_it(problem):
     assert right < 0.1 * error(problem, 0.0)
     assert error(problem, GAP, 2.0 * MOTOR) > 5.0 * right
     assert error(problem, 0.8 * GAP) > 5.0 * right
+
+
+def test_a_motor_between_its_walls_begins_anew_as_it_was_read(problem):
+    """The link keeps its speed: its encoder, the motor's, does not show it."""
+    track = problem.data.track
+    resumed = np.zeros(np.shape(track.pos), np.float32)
+    for row in range(100, len(resumed) - 120, 120):
+        resumed[row : row + 13] = 1.0
+    anew = track.replace(resumed=jnp.asarray(resumed))
+    again = replace(problem, data=replace(problem.data, track=anew))
+    assert error(again, GAP) < 0.15 * error(problem, 0.0)
+
+
+def test_beside_a_spring_a_play_has_no_motor_of_its_own(problem):
+    """The spring's and the play's would be more than the joint."""
+    effects = {"backlash": {}, "compliance": {}}
+    nuisance, one = (
+        problem.space.values(problem.space.nominal[None])[1],
+        jnp.ones((1, 1)),
+    )
+    kinds = [k for k, _ in play.with_motor(effects, nuisance, one, False)]
+    assert play.KIND not in kinds
+    alone = play.with_motor({"backlash": {}}, nuisance, one, False)
+    assert [k for k, _ in alone] == [play.KIND]
 
 
 @pytest.mark.parametrize("gap_rad", [0.0, GAP])

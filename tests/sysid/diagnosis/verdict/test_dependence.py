@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from sysid.diagnosis.verdict.dependence import depends_on
 
-STEPS, PIECES = 400, 2
+STEPS, PIECES = 1200, 2
 VALID = np.ones((STEPS, PIECES), bool)
 
 
@@ -40,13 +40,31 @@ def test_a_wave_below_the_noise_is_seen(pole, per_rad):
 
 
 def test_what_is_small_beside_the_noise_does_not_matter():
-    """However surely a long record shows it."""
+    """However surely a long record shows it: 0.08 and 0.02 of its square."""
     rng = np.random.default_rng(3)
     t = np.arange(50_000)[:, None] / 20.0
     x, valid = np.sin(t), np.ones(t.shape, bool)
     noise, wave = rng.normal(size=t.shape), np.sin(20.0 * x)
     assert depends_on(noise + 0.4 * wave, x, valid)
     assert not depends_on(noise + 0.2 * wave, x, valid)
+
+
+def test_an_offset_of_each_hold_is_not_the_position_s():
+    """Dry friction leaves one; in few holds chance makes a wave of it."""
+    rng = np.random.default_rng(5)
+    for holds, samples in ((4, 400), (8, 200), (16, 100)):
+        valid = np.ones((holds * samples, 1), bool)
+        for _ in range(30):
+            offset = rng.normal(0.0, rng.choice([0.3, 0.5, 1.0]), holds)
+            x, own = (
+                np.repeat(y, samples) for y in (rng.uniform(-1, 1, holds), offset)
+            )
+            noise = rng.normal(size=x.shape)
+            assert not depends_on((noise + own)[:, None], x[:, None], valid)
+
+
+def test_nothing_that_is_left_depends_on_nothing():
+    assert not depends_on(np.zeros_like(VALID, float), motion(np.random), VALID)
 
 
 def test_samples_that_do_not_count_are_not_asked():
