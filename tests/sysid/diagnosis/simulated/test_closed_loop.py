@@ -147,7 +147,8 @@ def problem():
 
 def test_only_what_comes_nearer_is_confirmed(problem):
     assert judged(problem, 0.02, 0.01)
-    assert not judged(problem, 0.02, 0.016)  # a fifth
+    assert judged(problem, 0.02, 0.016)  # more than a third of its square
+    assert not judged(problem, 0.02, 0.018)  # a fifth of it
     assert judged(problem, 0.02, 0.014)
     assert not judged(problem, 0.02, 0.01, gained=2.0)  # as much as chance gains
     assert not judged(problem, 0.01, 0.01)
