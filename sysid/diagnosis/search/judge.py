@@ -57,10 +57,10 @@ LEAST_FALL = 1.0 - 0.75**0.5
 quarter of its square.
 
 What is significant need not matter: of a long record of a quiet encoder a servo's cycle
-is significant. Of errors with their weights, in 70 records of seven seeds of the wide
-battery without an effect, which are no evidence for it, at most 0.114 of the root goes
-with an effect that the likelihood and t are for, and 0.076 to 0.227 with right causes
-that a quarter of the root refused.
+is significant. Of errors with their weights, in 56 records of seven seeds of the wide
+battery without an effect that shows, which are no evidence for it, at most 0.114 of the
+root goes with an effect that the likelihood and t are for, and 0.076 to 0.227 with
+right causes that a quarter of the root refused.
 """
 
 LEAST_FALL_OF_EFFORT = 0.25

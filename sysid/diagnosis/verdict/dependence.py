@@ -69,9 +69,8 @@ def depends_on(
     k = int(np.argmax(np.abs(waves @ (e - e.mean()))))
     terms = np.stack([np.ones_like(x), waves[k].real, waves[k].imag], 1)
     rest = np.zeros(left.shape)
-    rest[valid], whole = _fitted(e, terms, np.ones_like(x))
-    share = 1.0 - float(np.sum(rest**2)) / max(whole, 1e-300)
-    if whole == 0.0 or share < LEAST_SHARE:
+    rest[valid], share = _fitted(e, terms, np.ones_like(x))
+    if share < LEAST_SHARE:
         return False
     by_samples = len(e) / correlation_time(rest, valid) * _log_fall(share)
     least = min(by_samples, _by_visits(e, terms, _visits(away, WAVES[k])[valid]))
@@ -89,8 +88,7 @@ def _by_visits(e: np.ndarray, terms: np.ndarray, visit: np.ndarray) -> float:
         return 0.0
     mean = np.bincount(visit, e) / counts
     shape = np.stack([np.bincount(visit, t) / counts for t in terms.T], 1)
-    rest, whole = _fitted(mean, shape, np.sqrt(counts))
-    share = 1.0 - float(np.sum(rest**2)) / max(whole, 1e-300)
+    _, share = _fitted(mean, shape, np.sqrt(counts))
     return (alike - _TERMS) * _log_fall(share)
 
 
@@ -100,10 +98,11 @@ def _log_fall(share: float) -> float:
 
 
 def _fitted(y: np.ndarray, terms: np.ndarray, root: np.ndarray):
-    """Weighted errors of a fit, by roots of weights, and those squared of the mean."""
+    """Errors of a fit, times the roots of weights, and the share that is the fit's."""
     near = np.linalg.lstsq(terms * root[:, None], y * root, rcond=None)[0]
     mean = np.average(y, weights=root**2)
-    return (y - terms @ near) * root, float(np.sum(((y - mean) * root) ** 2))
+    rest, whole = (y - terms @ near) * root, float(np.sum(((y - mean) * root) ** 2))
+    return rest, 1.0 - float(rest @ rest) / whole if whole > 0.0 else 0.0
 
 
 def _visits(away: Float[np.ndarray, "m p"], waves: float) -> Int[np.ndarray, "m p"]:
