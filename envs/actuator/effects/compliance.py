@@ -1,4 +1,8 @@
-"""A spring between motor, whose angle the encoder measures, and joint."""
+"""A spring between motor, whose angle the encoder measures, and joint.
+
+It is damped as metal and gears are. A servo that follows its target damps it as well,
+but at the limit of its torque it does not, and there a spring alone would ring on.
+"""
 
 import flax.struct
 import jax.numpy as jnp
@@ -6,15 +10,18 @@ from jaxtyping import Array, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
+DAMPING = 0.1
+"""ζ, damping ratio of the motor's inertia against a joint that stands."""
+
 
 @flax.struct.dataclass
 class Spring:
     """Spring and motor after a substep, as far as the joint's speed does not matter.
 
     Attributes:
-        torque: torque of the spring before the substep [N·m].
+        torque: torque of the spring before the substep, less that of its damping [N·m].
         ahead: speed of the motor less that of the joint.
-        base, slope: its torque after the substep is base − slope · joint speed.
+        base, slope: its torque and damping's at the end are base − slope · joint speed.
     """
 
     torque: Float[Array, "*j"]
@@ -25,24 +32,32 @@ class Spring:
 
 def _encoder(params: Params, spring: Spring, x, dt):
     """Finishes the last substep with the joint's speed; returns the motor's angle."""
-    torque = spring.base - spring.slope * x.qd
-    lag = params["compliance_rad_nm"]
+    lag, share = params["compliance_rad_nm"], _undamped(params, dt)
+    passed = spring.base - spring.slope * x.qd
+    torque = spring.torque + share * (passed - spring.torque)
     ahead = lag * (torque - spring.torque) / dt
     encoder, speed = x.encoder + lag * torque, x.encoder_speed + ahead
     spring = spring.replace(torque=torque, ahead=ahead)
     return spring, x.replace(encoder=encoder, encoder_speed=speed)
 
 
+def _undamped(params: Params, dt: float):
+    """Share of a change of torque that the spring has, 1 / (1 + C D / Δt)."""
+    heavy = params["compliance_rad_nm"] * params["motor_inertia_kgm2"]
+    return 1.0 / (1.0 + 2.0 * DAMPING * jnp.sqrt(heavy) / dt)
+
+
 def _transmission(params: Params, spring: Spring, x, dt):
     """Solves motor and spring implicitly for any speed that the joint will have.
 
-        J (v_m' − v_m) / Δt = τ − s [kp C (f' − f) + kd (v_m' − v_m)] − f'
-        v_m' = v' + C (f' − f) / Δt
+        J (v_m' − v_m) / Δt = τ − s [kp C (f' − f) + kd (v_m' − v_m)] − f' − D u
+        v_m' = v' + u,   u = C (f' − f) / Δt,   D = 2 ζ √(J / C)
 
     for the spring's torque f, with the share s of the gains that the servo follows.
     Of the motor's inertia the joint keeps what the spring is stiff enough to pass on.
     """
     lag, inertia = params["compliance_rad_nm"], params["motor_inertia_kgm2"]
+    lag = lag * _undamped(params, dt)
     if x.around.inertia is not None:
         inertia = jnp.minimum(inertia, x.around.inertia)
     heavy = inertia / dt + x.damping
@@ -65,7 +80,8 @@ def _rest(params: Params, target, q, dt) -> Spring:
 
 EFFECT = EffectKind(
     name="compliance",
-    equation="τ' = (q_m − q) / C, J q̈_m = τ − τ'; J is part of the joint's inertia",
+    equation="τ' = (q_m − q) / C + D (q̇_m − q̇), D = 0.2 √(J / C), J q̈_m = τ − τ'; J is "
+    "part of the joint's inertia",
     parameters={
         "compliance_rad_nm": Parameter(
             "rad/(N·m)", 0.0, 10.0, lognormal(0.05, 4.0), identity=0.0

@@ -191,8 +191,11 @@ class Space:
 
     def local(self) -> list[int]:
         """Indices of what belongs to a record and not to the mechanism."""
-        return [i for i, s in enumerate(self.slots) if s.name == "push_gain"]
+        return [i for i, s in enumerate(self.slots) if s.name in _LOCAL]
 
 
 _FREE = 5.0
+_LOCAL = ("push_gain", "ripple")
+"""Nuisance parameters of a record: how an effort that jumps with its targets is read,
+few moments show, and without them it goes where noise does."""
 _LOGS = ("stiffness", "damping", "encoder_scale")

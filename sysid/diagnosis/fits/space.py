@@ -53,8 +53,9 @@ _RECIPROCAL = {
     # Where no effort was logged, what a servo would ask for at once may be thirty times
     # what it gives behind a slow low-pass: a limit has no slope until it is met.
     "N·m": (1.0, 1.2, 1.6, 2.4, 4.0, 7.0, 12.0, 20.0, 34.0),
-    # From 0.02 to 1 s until the speed is that of the records.
-    "rad/s²": tuple(np.geomspace(0.2, 10.0, 14).tolist()),
+    # From 2 ms, which a stiff servo takes for a step, to 1 s until the speed is that of
+    # the records.
+    "rad/s²": tuple(np.geomspace(0.02, 10.0, 22).tolist()),
     # A little too tight a limit is far worse than none: its optimum is narrow. One move
     # may be thrice as fast as the others, and a limit that only cuts peaks is met by a
     # few per cent of its value.

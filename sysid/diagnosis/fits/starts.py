@@ -62,7 +62,7 @@ def best_starts(
     if not owned:
         return {}
     thetas = np.stack([origin, *(t for _, t in owned)])
-    rest, *costs = _linear_costs(problem, model, thetas)
+    rest, *costs = linear_costs(problem, model, thetas)
     idle = np.isclose(costs, rest, rtol=1e-6, atol=0.0)
     result = {}
     for name in names:
@@ -95,7 +95,7 @@ def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> lis
     index = problem.space.of(name)[0]
     starts = [_placed(origin, {index: u}) for u in grid_optima(problem, origin, index)]
     for spread in AROUND:
-        costs = _linear_costs(problem, model, np.stack(starts))
+        costs = linear_costs(problem, model, np.stack(starts))
         best = starts[int(np.argmin(costs))]
         for factor in np.exp(np.linspace(-spread, spread, 31)):
             theta = best.copy()
@@ -115,8 +115,21 @@ def many_optima(problem: Problem, name: str) -> bool:
     return problem.space.slots[problem.space.of(name)[0]].many_optima
 
 
-def _linear_costs(problem: Problem, model: Model, thetas: np.ndarray) -> np.ndarray:
-    """Returns the errors that remain when the nuisance parameters follow linearly."""
+def linear_costs(
+    problem: Problem, model: Model, thetas: Float[np.ndarray, "c n"]
+) -> Float[np.ndarray, " c"]:
+    """What remains when the nuisance parameters follow linearly: ‖(I − Q Qᵀ) r(θ)‖².
+
+    Args:
+        problem: residuals of a joint.
+        model: whose Jacobian J = Q R, with that of the priors, they follow.
+        thetas: coordinates θ [1].
+
+    Source:
+        Variable projection: G. H. Golub, V. Pereyra, The Differentiation of
+        Pseudo-Inverses and Nonlinear Least Squares Problems Whose Variables Separate,
+        SIAM Journal on Numerical Analysis 10(2), 1973; at slopes of one place.
+    """
     rs = problem.residual(thetas)
     fit, space = model.fit, problem.space
     prior_sd = space.prior_sds(model.effects)[fit.free]

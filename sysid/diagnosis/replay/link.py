@@ -15,8 +15,7 @@ import flax.struct
 import jax.numpy as jnp
 from jaxtyping import Array, Float
 
-DAMPING = 0.1
-"""Damping ratio of a spring: what metal and gears have."""
+from envs.actuator.effects.compliance import DAMPING
 
 MOST_ROTOR = 0.9
 """Largest share of a joint's inertia that is on the motor's side."""

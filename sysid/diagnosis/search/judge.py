@@ -156,6 +156,11 @@ class Judge:
             self.fits[id(model)] = (model, min(fits, key=lambda m: m.fit.cost))
         return self.fits[id(model)][1]
 
+    def knows(self, model: Model, fit: Model) -> None:
+        """Takes a fit of a model to the angle that was found elsewhere, if nearer."""
+        if fit.fit.cost < self.moved(model).fit.cost:
+            self.fits[id(model)] = (model, fit)
+
     def nominal(self, model: Model) -> Model:
         """Returns `moved` with its other parameters fitted within their tolerances."""
         if id(model) not in self.bounded:

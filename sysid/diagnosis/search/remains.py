@@ -11,14 +11,15 @@ equation is right to half of its trace. Of a friction that falls with speed 0.17
 about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
 
 
-def leaves_much(before: float, after: float) -> bool:
+def leaves_much(before: float, after: float, noise: float = LEFT) -> bool:
     """Whether of an error before causes more is left than noise and model error.
 
     Args:
         before: mean squared error of the nominal model, in units of its noise [1].
         after: the same with the causes [1].
+        noise: what noise may leave [1].
     """
-    return after > LEFT and after - 1.0 > REMAINING * (before - 1.0)
+    return after > noise and after - 1.0 > REMAINING * (before - 1.0)
 
 
 def becomes_noise(before: float, after: float) -> bool:

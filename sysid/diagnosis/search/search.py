@@ -6,7 +6,7 @@ the penalty of the priors of the nuisance parameters (`candidate`), so that a pa
 far off its prior is a finding and not silently absorbed.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from sysid.diagnosis.fits.candidate import (
     CONVERGED,
@@ -17,8 +17,9 @@ from sysid.diagnosis.fits.candidate import (
 )
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.by_angle import explains, unsolved
+from sysid.diagnosis.search.by_angle import explained, unsolved
 from sysid.diagnosis.search.coupling import coupled
+from sysid.diagnosis.search.decided import decided_by_angle
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.parts import EXCESS, in_parts
 from sysid.diagnosis.search.selection import accepted
@@ -136,8 +137,7 @@ def _by_angle(found: Search) -> Search:
     if start is None:
         return found
     again = _searched(*start)
-    left = again.base.errors[1], again.best.errors[1]
-    return again if explains(*left) else found
+    return again if explained(again.judge, again.base, again.best) else found
 
 
 def _searched(problem: Problem, base: Model, known: Model | None = None) -> Search:
@@ -174,9 +174,24 @@ def _searched(problem: Problem, base: Model, known: Model | None = None) -> Sear
             best, alternatives, without = base, {}, {}
     else:
         best, alternatives, without = exchanged(problem, best, base, judge)
-    rejected = [m for m in stage if set(best.effects) < set(m.effects)]
-    parts = (alternatives, without, rejected, problem.samples, judge)
-    return Search(problem, base, best, *parts)
+    return _decided(
+        Search(
+            problem, base, best, alternatives, without, stage, problem.samples, judge
+        )
+    )
+
+
+def _decided(found: Search) -> Search:
+    """Lets the angle decide between effects, and keeps what the answer lacks."""
+    problem, best = found.problem, found.best
+    parts = found.alternatives, found.without
+    moved = decided_by_angle(found.judge, best, *parts)
+    if moved is not None:
+        best, parts = moved, swapped(problem, moved, found.base)
+    rejected = [m for m in found.rejected if set(best.effects) < set(m.effects)]
+    alternatives, without = parts
+    changed = {"alternatives": alternatives, "without": without, "rejected": rejected}
+    return replace(found, best=best, **changed)
 
 
 def _fullest(better: list[Model]) -> Model:

@@ -20,7 +20,12 @@ from sysid.diagnosis.fits.origins import (
     put_back,
     with_effects,
 )
-from sysid.diagnosis.fits.starts import FAR_SD, best_starts, many_optima
+from sysid.diagnosis.fits.starts import (
+    FAR_SD,
+    best_starts,
+    linear_costs,
+    many_optima,
+)
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 EQUATIONS_TRIED = 3
@@ -28,7 +33,8 @@ EQUATIONS_TRIED = 3
 
 ALONE_TRIED = 3
 """The same of those that come nearest to it when they are fitted alone: at nominal, in
-the smaller model, and there with what has left its tolerance put back, each."""
+the smaller model, and there with what has left its tolerance put back, each; and as
+they begin there, if the nuisance parameters follow them."""
 
 
 def settled_output(
@@ -71,7 +77,9 @@ def output_starts(
     a nominal parameter of the smaller model stands for an effect, as the servo's
     damping for viscous friction, all effects come alike near there; at nominal they do
     not. But there the gains' own tolerances may matter more than any effect, so those
-    begin too that come nearest where it alone is put back.
+    begin too that come nearest where it alone is put back. And those begin that come
+    nearest if the nuisance parameters follow: alone beside those that have taken up a
+    part of it, as gains take up play, an effect shrinks to nothing.
 
     Args:
         problem: the error of the angle.
@@ -80,7 +88,8 @@ def output_starts(
     """
     sets = [m.effects for m in proposed]
     begin = [at_nominal(problem, m) for m in proposed]
-    beside = _beside(problem, smaller, proposed, smaller.fit.theta)
+    own = _own_starts(problem, smaller, proposed, smaller.fit.theta)
+    beside = _beside(problem, proposed, smaller.fit.theta, own)
     fits = fitted_alone(problem, [*sets, *sets], [*begin, *beside])
     alone, added = fits[: len(sets)], fits[len(sets) :]
     fitted = [m.fit.theta for m in proposed]
@@ -91,7 +100,33 @@ def output_starts(
         ranked = np.argsort(costs(problem, sets, thetas))
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
     starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
+    starts += _followed(problem, smaller, proposed, own)
     return starts + _with_others_back(problem, smaller, proposed)
+
+
+def _followed(
+    problem: OutputProblem, smaller: Model, proposed: list[Model], own: dict[str, list]
+) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
+    """Returns the effects' own starts beside which the nuisance parameters do most."""
+    begin = [
+        (m.effects, own[e][0]) for m in proposed for e in m.effects[-1:] if e in own
+    ]
+    if not begin:
+        return []
+    left = linear_costs(problem, smaller, np.stack([theta for _, theta in begin]))
+    return [begin[k] for k in np.argsort(left)[:ALONE_TRIED].tolist()]
+
+
+def _own_starts(
+    problem: OutputProblem,
+    smaller: Model,
+    proposed: list[Model],
+    origin: Float[np.ndarray, " n"],
+) -> dict[str, list]:
+    """Returns the best own starts of the last effects, all else as at an origin."""
+    names = [m.effects[-1] for m in proposed]
+    smooth = [name for name in names if not many_optima(problem, name)]
+    return best_starts(problem, smaller, origin, smooth)
 
 
 def _with_others_back(
@@ -102,16 +137,17 @@ def _with_others_back(
     if np.array_equal(origin, smaller.fit.theta):
         return []
     sets = [m.effects for m in proposed]
-    fits = fitted_alone(problem, sets, _beside(problem, smaller, proposed, origin))
+    own = _own_starts(problem, smaller, proposed, origin)
+    fits = fitted_alone(problem, sets, _beside(problem, proposed, origin, own))
     ranked = np.argsort(costs(problem, sets, fits))[:ALONE_TRIED]
     return [(sets[k], fits[k]) for k in ranked.tolist()]
 
 
 def _beside(
     problem: OutputProblem,
-    smaller: Model,
     proposed: list[Model],
     origin: Float[np.ndarray, " n"],
+    own: dict[str, list],
 ) -> list[Float[np.ndarray, " n"]]:
     """Returns an origin, each time with the last effect of another larger model.
 
@@ -120,8 +156,6 @@ def _beside(
     of the other direction, and from there no slope leads back.
     """
     names = [m.effects[-1] for m in proposed]
-    smooth = [name for name in names if not many_optima(problem, name)]
-    own = best_starts(problem, smaller, origin, smooth)
     said = [with_effects(problem, origin, m, m.effects[-1:]) for m in proposed]
     tried = [own.get(name, [u])[0] for name, u in zip(names, said, strict=True)]
     sets, rest = [m.effects for m in proposed], [origin] * len(names)

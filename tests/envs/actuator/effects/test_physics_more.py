@@ -125,9 +125,16 @@ def test_motor_and_joint_swing_against_each_other():
     _, v, _ = rig.run(spring(c, j), np.zeros(10000), push, kp=0, kd=0, dt=dt)
     mean = 1.0 * 50 * dt / rig.INERTIA
     crossings = np.flatnonzero(np.diff(np.sign(v - mean)) != 0)
+    crossings = crossings[crossings > 50][:8]
     omega = np.sqrt((1.0 / j + 1.0 / (rig.INERTIA - j)) / c)
     found = np.pi / (np.mean(np.diff(crossings)) * dt)
     assert found == pytest.approx(omega, rel=0.02)
+    # And the less the longer: ζ' = ζ √(I / (I − J)) of what swings.
+    parts = np.split(np.abs(v - mean), crossings)[1:-1]
+    ratio = 0.1 * np.sqrt(rig.INERTIA / (rig.INERTIA - j))
+    decrement = np.pi * ratio / np.sqrt(1.0 - ratio**2)
+    falls = -np.diff(np.log([part.max() for part in parts]))
+    assert falls == pytest.approx(decrement, rel=0.1)
 
 
 def test_a_spring_gives_no_more_energy_than_it_got():

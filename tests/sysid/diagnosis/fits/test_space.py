@@ -27,6 +27,22 @@ def test_some_start_is_near_every_torque_that_a_slow_low_pass_leaves():
         assert np.abs(np.log(starts / limit)).min() < 0.3
 
 
+def test_some_start_is_near_every_acceleration_of_a_stiff_servo():
+    """Of a step it takes a few milliseconds to its speed."""
+    problem = problem_with()
+    (index,) = problem.space.of("acceleration_limit")
+    slot = problem.space.slots[index]
+    starts = slot.value(np.array(slot.starts))
+    for rise_s in np.geomspace(0.002, 1.0, 40):
+        assert np.abs(np.log(starts * rise_s / problem.data.speed_scale)).min() < 0.16
+
+
+def test_how_an_effort_is_read_belongs_to_a_record():
+    """Predicting a fold, it would go where the noise of the others does."""
+    space = problem_with().space
+    assert [space.slots[i].name for i in space.local()] == ["ripple"]
+
+
 def test_sizes_that_may_have_either_sign_begin_small_too():
     """Where a joint swings at its limit a tenth of all torques is no start."""
     space = problem_with().space

@@ -36,8 +36,9 @@ def test_much_is_more_than_noise_and_than_what_a_model_errs_by():
     [
         (6.2, 6.2, True, True),
         (6.2, 6.2, False, True),  # noise is what neighbouring readings do not share
-        (1.6, 1.6, False, False),
-        (1.6, 1.6, True, False),
+        (1.2, 1.2, False, False),
+        (1.2, 1.2, True, False),
+        (1.8, 1.8, True, True),  # too little to be unexplained, and worth a search
         (9.0, 1.1, True, False),
     ],
 )
@@ -61,7 +62,9 @@ def test_an_angle_that_no_answer_explains_is_searched_itself(
 )
 def test_a_search_of_the_angle_counts_if_it_explains(before, left, counts, monkeypatch):
     base, best = model(before), model(left, ("compliance",))
-    again = SimpleNamespace(base=base, best=best)
+    judge: Any = SimpleNamespace(pair=lambda *models: models)
+    judge.fall = lambda a, b: 1.0 - (b.errors[1] / a.errors[1]) ** 0.5
+    again = SimpleNamespace(base=base, best=best, judge=judge)
     monkeypatch.setattr(search_module, "unsolved", lambda *args: ("angle", base))
     monkeypatch.setattr(search_module, "_searched", lambda problem, model: again)
     first: Any = SimpleNamespace(judge=None, base=base, best=base, rejected=[])
