@@ -11,7 +11,8 @@ from jaxtyping import Array, Float
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, lognormal
 
 DAMPING = 0.1
-"""ζ, damping ratio of the motor's inertia against a joint that stands."""
+"""ζ, damping ratio of a spring: what metal and gears have. Here it is that of the motor
+against a joint that stands, with D = 2 ζ √(J / C)."""
 
 
 @flax.struct.dataclass
@@ -32,7 +33,8 @@ class Spring:
 
 def _encoder(params: Params, spring: Spring, x, dt):
     """Finishes the last substep with the joint's speed; returns the motor's angle."""
-    lag, share = params["compliance_rad_nm"], _undamped(params, dt)
+    lag, inertia = _motor(params, x)
+    share = _undamped(lag, inertia, dt)
     passed = spring.base - spring.slope * x.qd
     torque = spring.torque + share * (passed - spring.torque)
     ahead = lag * (torque - spring.torque) / dt
@@ -41,10 +43,20 @@ def _encoder(params: Params, spring: Spring, x, dt):
     return spring, x.replace(encoder=encoder, encoder_speed=speed)
 
 
-def _undamped(params: Params, dt: float):
+def _motor(params: Params, x):
+    """Returns C and J: of the joint's inertia no more than there is."""
+    lag, inertia = params["compliance_rad_nm"], params["motor_inertia_kgm2"]
+    if x.around.inertia is not None:
+        inertia = jnp.minimum(inertia, x.around.inertia)
+    return lag, inertia
+
+
+def _undamped(lag: Array, inertia: Array, dt: float) -> Array:
     """Share of a change of torque that the spring has, 1 / (1 + C D / Δt)."""
-    heavy = params["compliance_rad_nm"] * params["motor_inertia_kgm2"]
-    return 1.0 / (1.0 + 2.0 * DAMPING * jnp.sqrt(heavy) / dt)
+    heavy = lag * inertia
+    # The slope of a root at zero is infinite.
+    root = jnp.sqrt(jnp.where(heavy > 0.0, heavy, 1.0)) * (heavy > 0.0)
+    return 1.0 / (1.0 + 2.0 * DAMPING * root / dt)
 
 
 def _transmission(params: Params, spring: Spring, x, dt):
@@ -56,10 +68,8 @@ def _transmission(params: Params, spring: Spring, x, dt):
     for the spring's torque f, with the share s of the gains that the servo follows.
     Of the motor's inertia the joint keeps what the spring is stiff enough to pass on.
     """
-    lag, inertia = params["compliance_rad_nm"], params["motor_inertia_kgm2"]
-    lag = lag * _undamped(params, dt)
-    if x.around.inertia is not None:
-        inertia = jnp.minimum(inertia, x.around.inertia)
+    lag, inertia = _motor(params, x)
+    lag = lag * _undamped(lag, inertia, dt)
     heavy = inertia / dt + x.damping
     soft = lag * (heavy / dt + x.follows * x.kp)
     base = (x.torque + heavy * (x.qd + spring.ahead) + soft * spring.torque) / (

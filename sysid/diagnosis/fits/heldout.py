@@ -68,7 +68,10 @@ class _Part:
         hessian, slope = self._quadratic(theta, residual, self.kept)
         common = self._quadratic(fit.theta, fit.residual, np.ones(len(self.kept), bool))
         rest = solved(*common, ~np.isin(k, fit.bounded))
-        bounds = ((end - theta)[k] for end in (task.low, task.high))
+        held = np.isin(k, self.local)
+        bounds = (
+            np.where(held, 0.0, (end - theta)[k]) for end in (task.low, task.high)
+        )
         slope, moved = slope + hessian @ rest, theta.copy()
         moved[k] += bounded_step(hessian + damping * np.eye(len(k)), slope, *bounds)
         moved[k] = np.clip(moved[k], task.low[k], task.high[k])

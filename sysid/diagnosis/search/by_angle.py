@@ -1,10 +1,10 @@
-"""The angle is searched itself where the equations' answer leaves much of it.
+"""The angle is searched itself where the equations' answer leaves some of it.
 
 A logged effort that jumps with its targets is noisy, and a spring or a limit that the
-equations then do not show moves the angle by many times its noise. Such an answer is
-none: a search by the error of the angle, as where no effort was logged, can only do
-better, and counts if it explains what the first did not. The effort did not show what
-it names, so much of the angle's error has to go, however little remains.
+equations then do not show moves the angle by many times its noise. A search by the
+error of the angle, as where no effort was logged, may do better, and counts if it
+leaves less than the first and next to nothing. The effort did not show what it names,
+so much of the angle's error has to go, however little remains.
 """
 
 from sysid.diagnosis.fits.candidate import Model
@@ -13,7 +13,8 @@ from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 FAR_LESS = 0.25
-"""Least share of the angle's error that goes with the answer of such a search."""
+"""Least share of the error of held-out angles that goes with the answer of such a
+search."""
 
 
 SEARCHED = 1.3
@@ -42,15 +43,18 @@ def explains(before: float, after: float) -> bool:
     return fall > FAR_LESS and not leaves_much(before, after)
 
 
-def explained(judge: Judge, base: Model, best: Model) -> bool:
+def explained(judge: Judge, base: Model, best: Model, first: Model) -> bool:
     """Whether the answer of such a search explains the angle, by what it predicts.
 
     Args:
         judge: of the search of the angle.
         base: its nominal model.
         best: its answer.
+        first: the answer of the equations, fitted to the angle.
     """
     if not best.effects or leaves_much(base.errors[1], best.errors[1]):
+        return False
+    if best.errors[1] >= first.errors[1]:
         return False
     return judge.fall(*judge.pair(base, best)) > FAR_LESS
 
@@ -69,8 +73,7 @@ def unsolved(
     output = judge.output
     if output is judge.problem or not isinstance(output, OutputProblem):
         return None
-    # Without repeats its noise is what neighbouring readings do not share, by which
-    # the verdict without this search would be that something is unexplained.
+    # Without repeats its noise is what neighbouring readings do not share.
     before, after = nearest(judge, base), nearest(judge, best)
     if not leaves_much(before.errors[1], after.errors[1], SEARCHED):
         return None

@@ -1,68 +1,96 @@
 """Between effects that the equations hardly distinguish, the simulated angle decides.
 
 An equation of means over steps explains a torque with whatever is large at the same
-time; the motion that follows from it need not be that which was measured. Another
-effect takes the place of a cause where the angle with it is more likely by more than
-the equations are less so. Asked are effects that explain about as much of the
-equations; and where these show less of a cause than the angle does, those that the
-angle prefers.
+time; the motion that follows from it need not be that which was measured. Where one
+cause was found, another effect takes its place if the angle with it is more likely by
+more than the equations are less so, by a share of what the cause explains of the angle:
+no simulation is exact. Asked are effects that explain about as much of the equations;
+and where these show less of the cause than the angle does, those that the angle
+prefers.
 """
 
+from dataclasses import dataclass
+
 from sysid.diagnosis.fits.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.judge import TRIED, Judge
-from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
-from sysid.diagnosis.search.stage import NESTED, extended
+from sysid.diagnosis.search.selection import plausible, threshold_of
+from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE, extended
 
 EXPLAINED = 0.5
 """Least share of a cause's gain in the equations that an effect in its place has."""
 
 
+@dataclass(frozen=True)
+class Decided:
+    """What the angle preferred to the answer of the equations.
+
+    Attributes:
+        best: the model.
+        leads: how much likelier it is than others by angle, less what it is less likely
+            by equations, by their effects; () for none, by angle alone [nat].
+    """
+
+    best: Model
+    leads: dict[tuple[str, ...], float]
+
+
 def decided_by_angle(
-    judge: Judge,
-    best: Model,
-    alternatives: dict[str, list[Model]],
-    without: dict[str, Model],
-) -> Model | None:
-    """Returns the model that the angle prefers to the equations' answer, if one is.
+    judge: Judge, base: Model, best: Model, others: list[Model]
+) -> Decided | None:
+    """Returns what the angle prefers to a single cause, if it prefers anything.
 
     Args:
         judge: of the search by equations.
-        best: its answer.
-        alternatives: for each cause, models with another effect in its place.
-        without: for each cause, the model without it.
+        base: the nominal model.
+        best: the answer of the search, with one cause.
+        others: models with another effect in its place, best first.
     """
-    if judge.output is judge.problem or not judge.sees:
+    if judge.output is judge.problem or not judge.sees or len(best.effects) != 1:
         return None
-    ahead = {
-        m.effects: (_ahead(judge, best, m), m)
-        for cause, models in alternatives.items()
-        for m in _asked(judge, best, without[cause], models)
-        if not set(m.effects) & set(NESTED.get(cause, ()))
-        and judge.confirms(without[cause], m)
-    }
-    by, model = max(ahead.values(), key=lambda a: a[0], default=(0.0, best))
-    return model if by > NOMINAL_THRESHOLD else None
+    asked = _asked(judge, base, best, others)
+    gain = _by_angle(judge, base, best)
+    ahead = {m.effects: _ahead(judge, best, m) for m in asked}
+    for m in sorted(asked, key=lambda m: -ahead[m.effects]):
+        least = max(threshold_of(judge.problem, m), NESTED_SHARE * gain)
+        if ahead[m.effects] > least and judge.confirms(base, m):
+            leads = {e: ahead[m.effects] - by for e, by in ahead.items()}
+            leads |= {best.effects: ahead[m.effects], (): _by_angle(judge, base, m)}
+            return Decided(m, leads)
+    return None
 
 
-def _asked(judge: Judge, best: Model, without: Model, models: list[Model]) -> list:
-    """Returns the models that may be nearer, likeliest first."""
-    samples, output = judge.problem.samples, judge.output
-    gain = likelihood_gap(without, best, samples)
-    behind = nearest(judge, without), nearest(judge, best)
-    if likelihood_gap(*behind, output.samples) < gain:
+def _asked(judge: Judge, base: Model, best: Model, others: list[Model]) -> list[Model]:
+    """Returns the models that may be nearer."""
+    problem, (cause,) = judge.problem, best.effects
+    others = [m for m in others if _may_stand(problem, base, m, cause)]
+    gain = likelihood_gap(base, best, problem.samples)
+    if _by_angle(judge, base, best) < gain:
         least = (1.0 - EXPLAINED) * gain
-        return [m for m in models if likelihood_gap(m, best, samples) < least][:TRIED]
-    fitted = {m.effects: m for m in models}
-    stage = extended(output, judge.moved(without))
-    asked = [m for m in stage if m.effects in fitted][:TRIED]
-    for m in asked:
-        judge.knows(fitted[m.effects], m)
-    return [fitted[m.effects] for m in asked]
+        near = [m for m in others if likelihood_gap(m, best, problem.samples) < least]
+        return near[:TRIED]
+    stage = {m.effects: m for m in extended(judge.output, judge.moved(base))}
+    for m in (best, *others):  # all alike from many starts
+        if m.effects in stage:
+            judge.knows(m, stage[m.effects])
+    asked = {m.effects: m for m in others}
+    return [asked[effects] for effects in stage if effects in asked][:TRIED]
+
+
+def _may_stand(problem: Problem, base: Model, model: Model, cause: str) -> bool:
+    """Whether an effect can take the place of a cause that it does not contain."""
+    (effect,) = model.effects
+    return effect not in NESTED.get(cause, ()) and plausible(problem, base, model)
+
+
+def _by_angle(judge: Judge, worse: Model, better: Model) -> float:
+    """How much likelier the angle is with a model [nat]."""
+    fits = nearest(judge, worse), nearest(judge, better)
+    return likelihood_gap(*fits, judge.output.samples)
 
 
 def _ahead(judge: Judge, best: Model, other: Model) -> float:
     """How much likelier another model is by angle than less so by equations [nat]."""
-    here, there = nearest(judge, best), nearest(judge, other)
-    gained = likelihood_gap(here, there, judge.output.samples)
-    return gained - max(0.0, likelihood_gap(other, best, judge.problem.samples))
+    behind = likelihood_gap(other, best, judge.problem.samples)
+    return _by_angle(judge, best, other) - max(0.0, behind)

@@ -6,7 +6,8 @@ the penalty of the priors of the nuisance parameters (`candidate`), so that a pa
 far off its prior is a finding and not silently absorbed.
 """
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from sysid.diagnosis.fits.candidate import (
     CONVERGED,
@@ -17,24 +18,20 @@ from sysid.diagnosis.fits.candidate import (
 )
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.motion import JointTrack
-from sysid.diagnosis.search.by_angle import explained, unsolved
+from sysid.diagnosis.search.by_angle import explained, nearest, unsolved
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.decided import decided_by_angle
+from sysid.diagnosis.search.exchange import MOST, exchanged, pruned, swapped
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.parts import EXCESS, in_parts
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.settling import refitted, settled
 from sysid.diagnosis.search.stage import (
-    NESTED_SHARE,
-    deciding_gap,
     extended,
     still_accepted,
 )
 from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import settled_output
-
-MOST = 3
-"""Largest number of causes."""
 
 STRAINED = 25.0
 """Squared prior deviations of the nuisance parameters that are no accident [1]."""
@@ -54,6 +51,8 @@ class Search:
         rejected: candidates with one effect more, of the last stage, best first.
         samples: number of residuals that count.
         judge: compares the simulations of its models.
+        leads: where the angle decided, how far it puts others behind the chosen model,
+            by their effects [nat].
     """
 
     problem: Problem
@@ -64,11 +63,24 @@ class Search:
     rejected: list[Model]
     samples: int
     judge: Judge
+    leads: Mapping[tuple[str, ...], float] = field(default_factory=dict)
 
     def gain(self, cause: str) -> float:
         """Log-likelihood gain of the best model over that without a cause."""
         without = self.without.get(cause, self.base)
-        return log_likelihood_gain(without, self.best, self.samples)
+        gain = log_likelihood_gain(without, self.best, self.samples)
+        return max(gain, self.leads.get(without.effects, gain))
+
+    def behind(self, model: Model) -> float:
+        """How far a model is behind the best one [nat]: by the angle, if that decided.
+
+        What it was not asked about is no nearer than the last of those.
+        """
+        gap = likelihood_gap(model, self.best, self.samples)
+        if not self.leads:
+            return gap
+        asked = self.leads.get(model.effects)
+        return max(gap, min(self.leads.values())) if asked is None else asked
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,12 +144,14 @@ def _with_first(again: Search, first: Model) -> Search:
 
 
 def _by_angle(found: Search) -> Search:
-    """Searches the angle itself where the answer of the equations leaves much of it."""
+    """Searches the angle itself where the answer of the equations leaves some of it."""
     start = unsolved(found.judge, found.base, found.best, found.rejected)
     if start is None:
         return found
     again = _searched(*start)
-    return again if explained(again.judge, again.base, again.best) else found
+    first = nearest(found.judge, found.best)
+    better = explained(again.judge, again.base, again.best, first)
+    return again if better else found
 
 
 def _searched(problem: Problem, base: Model, known: Model | None = None) -> Search:
@@ -183,15 +197,16 @@ def _searched(problem: Problem, base: Model, known: Model | None = None) -> Sear
 
 def _decided(found: Search) -> Search:
     """Lets the angle decide between effects, and keeps what the answer lacks."""
-    problem, best = found.problem, found.best
-    parts = found.alternatives, found.without
-    moved = decided_by_angle(found.judge, best, *parts)
-    if moved is not None:
-        best, parts = moved, swapped(problem, moved, found.base)
-    rejected = [m for m in found.rejected if set(best.effects) < set(m.effects)]
-    alternatives, without = parts
-    changed = {"alternatives": alternatives, "without": without, "rejected": rejected}
-    return replace(found, best=best, **changed)
+    problem, base, best = found.problem, found.base, found.best
+    others = [m for models in found.alternatives.values() for m in models]
+    said = decided_by_angle(found.judge, base, best, others)
+    if said is not None:
+        alternatives, without = swapped(problem, said.best, base)
+        parts = {"alternatives": alternatives, "without": without}
+        found = replace(found, best=said.best, leads=said.leads, **parts)
+    kept = set(found.best.effects)
+    rejected = [m for m in found.rejected if kept < set(m.effects)]
+    return replace(found, rejected=rejected)
 
 
 def _fullest(better: list[Model]) -> Model:
@@ -221,71 +236,3 @@ def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | Non
             return model
         nearer = nearer or model
     return nearer
-
-
-def pruned(problem: Problem, model: Model, base: Model) -> Model:
-    """Drops effects that a larger model no longer needs."""
-    while len(model.effects) > 1:
-        sets = [tuple(e for e in model.effects if e != out) for out in model.effects]
-        smaller = fit_models(problem, sets, [model.fit.theta] * len(sets))
-        best = min(smaller, key=lambda m: m.score)
-        if accepted(problem, best, model, base):
-            return model
-        model = best
-    return model
-
-
-def exchanged(
-    problem: Problem, best: Model, base: Model, judge: Judge
-) -> tuple[Model, dict[str, list[Model]], dict[str, Model]]:
-    """Lets other effects take the places of causes while that is better.
-
-    The first cause of several was chosen when it stood for all of them. One that is not
-    accepted together with the others goes, that with the least evidence first.
-
-    Returns:
-        The model, and for each cause its alternatives and the model without it.
-    """
-    samples = problem.samples
-    for _ in range(2 * MOST):
-        others, without = swapped(problem, best, base)
-        idle = [
-            c
-            for c in best.effects
-            if not accepted(problem, without[c], best, base)
-            or not judge.confirms(without[c], best)
-        ]
-        if idle:
-            gaps = {c: likelihood_gap(without[c], best, samples) for c in idle}
-            best = without[min(gaps, key=gaps.__getitem__)]
-            continue
-        for cause, stage in others.items():
-            gain = likelihood_gap(without[cause], best, samples)
-            better = [
-                m
-                for m in stage
-                if likelihood_gap(best, m, samples)
-                > max(NESTED_SHARE * gain, deciding_gap(problem, cause, m, gain))
-                and accepted(problem, without[cause], m, base)
-                and judge.confirms(without[cause], m)
-            ]
-            if better:
-                break
-        else:
-            return best, others, without
-        best = pruned(problem, better[0], base)
-    return best, *swapped(problem, best, base)
-
-
-def swapped(
-    problem: Problem, best: Model, base: Model
-) -> tuple[dict[str, list[Model]], dict[str, Model]]:
-    """Lets every other effect take the place of each cause, and none."""
-    alternatives, without = {}, {}
-    for cause in best.effects:
-        rest = tuple(e for e in best.effects if e != cause)
-        refit = fit_models(problem, [rest], [best.fit.theta])[0] if rest else base
-        without[cause] = refit
-        stage = extended(problem, without[cause])
-        alternatives[cause] = [m for m in stage if cause not in m.effects]
-    return alternatives, without

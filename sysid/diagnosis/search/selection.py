@@ -53,13 +53,39 @@ def accepted(problem: Problem, smaller: Model, larger: Model, base: Model) -> bo
             held = heldout_gain(smaller, larger, problem.samples)
             return held > NOMINAL_THRESHOLD
         return gain > max(NOMINAL_THRESHOLD, least)
-    if any(_within_cycle(problem, larger, e) for e in added):
-        return False
-    if "load_friction" in added and not _predicts_effort(problem, smaller, larger):
+    if not plausible(problem, smaller, larger):
         return False
     threshold = _threshold(problem, larger, added)
     removes = _removes_enough(problem, smaller, larger, base)
     return gain > max(threshold, least) and removes
+
+
+def plausible(problem: Problem, smaller: Model, larger: Model) -> bool:
+    """Whether what a larger model adds can be, however much it gains.
+
+    Args:
+        problem: of the joint.
+        smaller: a model.
+        larger: one with effects more.
+    """
+    added = [e for e in larger.effects if e not in smaller.effects]
+    if any(_within_cycle(problem, larger, e) for e in added):
+        return False
+    friction = "load_friction" in added
+    return not friction or _predicts_effort(problem, smaller, larger)
+
+
+def threshold_of(problem: Problem, model: Model) -> float:
+    """What the effects of a model must gain [nat].
+
+    Args:
+        problem: of the joint.
+        model: a fitted model.
+
+    Source:
+        Ours; `THRESHOLD` and what chance adds to it.
+    """
+    return _threshold(problem, model, list(model.effects))
 
 
 def _threshold(problem: Problem, model: Model, added: list[str]) -> float:

@@ -67,7 +67,7 @@ def settled_output(
 def output_starts(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns where fits of the likeliest models begin: from two places each.
+    """Returns where fits of the likeliest models begin: from two places each, and more.
 
     One is near: the effect fitted alone beside the smaller model, or all as in the
     equations, whichever errs less. The other begins at nominal, with the effect fitted
@@ -107,14 +107,22 @@ def output_starts(
 def _followed(
     problem: OutputProblem, smaller: Model, proposed: list[Model], own: dict[str, list]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns the effects' own starts beside which the nuisance parameters do most."""
+    """Returns the effects' own starts beside which the nuisance parameters do most.
+
+    What is one of these parameters itself follows, and a limit that is not met changes
+    nothing: both leave as much as is there, and are no starts.
+    """
     begin = [
-        (m.effects, own[e][0]) for m in proposed for e in m.effects[-1:] if e in own
+        (m.effects, own[e][0])
+        for m in proposed
+        for e in m.effects[-1:]
+        if e in own and not problem.space.has_nominal(e)
     ]
-    if not begin:
-        return []
-    left = linear_costs(problem, smaller, np.stack([theta for _, theta in begin]))
-    return [begin[k] for k in np.argsort(left)[:ALONE_TRIED].tolist()]
+    thetas = np.stack([smaller.fit.theta, *(theta for _, theta in begin)])
+    rest, *left = linear_costs(problem, smaller, thetas)
+    idle = np.isclose(left, rest, rtol=1e-6, atol=0.0)
+    ranked = [k for k in np.argsort(left).tolist() if not idle[k]]
+    return [begin[k] for k in ranked[:ALONE_TRIED]]
 
 
 def _own_starts(

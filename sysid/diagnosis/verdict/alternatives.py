@@ -3,7 +3,7 @@
 import numpy as np
 
 from envs.actuator.catalogue import CATALOGUE
-from sysid.diagnosis.fits.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.candidate import Model
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD, THRESHOLD
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE
@@ -38,10 +38,10 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     """
     result = []
     without = found.without.get(cause, found.base)
-    gain = likelihood_gap(without, found.best, found.samples)
+    gain = found.behind(without)
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
-        gap = likelihood_gap(model, found.best, found.samples)
+        gap = found.behind(model)
         least = NOMINAL_THRESHOLD if _alike(model, found.best) else DISTINCT
         distinct = gap > max(least, NESTED_SHARE * gain)
         distinct = distinct or effect in NESTED.get(cause, ())

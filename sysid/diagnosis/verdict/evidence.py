@@ -1,6 +1,6 @@
 """The evidence for every set of effects that a search fitted to one joint."""
 
-from sysid.diagnosis.fits.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.candidate import Model
 from sysid.diagnosis.search.search import Search
 
 
@@ -8,6 +8,8 @@ def evidence(found: Search) -> dict[tuple[str, ...], float]:
     """Log predictive likelihoods of sets of effects, less that of the chosen one.
 
         ℓ(M) − ℓ(M*) = −Δ log L
+
+    of the equations, or of the angle where that decided.
 
     Args:
         found: the search of one joint.
@@ -17,7 +19,7 @@ def evidence(found: Search) -> dict[tuple[str, ...], float]:
         0 for the chosen set [1].
 
     Source:
-        `likelihood_gap`, on stretches that no fit saw.
+        `Search.behind`, on stretches that no fit saw.
     """
     models: list[Model] = [found.base, *found.rejected, *found.without.values()]
     for others in found.alternatives.values():
@@ -25,6 +27,6 @@ def evidence(found: Search) -> dict[tuple[str, ...], float]:
     said: dict[tuple[str, ...], float] = {}
     for m in models:  # a set that was fitted twice counts by its better fit
         key = tuple(sorted(m.effects))
-        value = -likelihood_gap(m, found.best, found.samples)
+        value = -found.behind(m)
         said[key] = max(said.get(key, value), value)
     return {**said, tuple(sorted(found.best.effects)): 0.0}

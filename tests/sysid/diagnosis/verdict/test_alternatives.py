@@ -43,3 +43,25 @@ def test_what_predicts_the_same_is_set_apart_by_priors_alone(behind, moved, apar
     (alternative,) = alternatives_of(found)
     assert alternative.effect == "viscous_friction"
     assert alternative.distinguishable == apart
+
+
+def test_where_the_angle_decided_alternatives_are_behind_by_it():
+    """The equations' answer is ahead of it in the equations, and refuted."""
+    best, base = model("joint_coupling", 10.0), model("", 24.0, moved=50.0)
+    first, close = model("payload_com", 0.0, 9.0), model("stiffness", 9.0, 9.0)
+    judge = SimpleNamespace(prefers=lambda smaller, larger: True)
+    others = ({"joint_coupling": [first, close]}, {"joint_coupling": base}, [])
+    leads = {("payload_com",): 300.0, ("stiffness",): 1.0, (): 600.0}
+    found = Search(None, base, best, *others, SAMPLES, judge, leads)
+    near, far = alternatives_of(found)
+    assert (near.effect, near.score_gap, near.distinguishable) == (
+        "stiffness",
+        1,
+        False,
+    )
+    assert (far.effect, far.score_gap, far.distinguishable) == (
+        "payload_com",
+        300,
+        True,
+    )
+    assert found.gain("joint_coupling") == 600.0

@@ -17,7 +17,7 @@ from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.fits.starts import starts_of
 from sysid.diagnosis.measured.segments import grid_step_s
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search import search as search_module
+from sysid.diagnosis.search import exchange
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.coupling import coupled, with_neighbour
 from sysid.diagnosis.search.judge import Judge
@@ -230,18 +230,18 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
     offered = {first.effects: {"payload_com": [right], "deadband": []}}
     monkeypatch.setattr(
-        search_module,
+        exchange,
         "swapped",
         lambda problem, best, base: (offered.get(best.effects, {}), without),
     )
-    monkeypatch.setattr(search_module, "pruned", lambda problem, model, base: model)
+    monkeypatch.setattr(exchange, "pruned", lambda problem, model, base: model)
     willing = SimpleNamespace(confirms=lambda smaller, larger: True)
-    assert search_module.exchanged(problem, first, base, willing)[0] is right
+    assert exchange.exchanged(problem, first, base, willing)[0] is right
     close = scored(right.effects, 302.0)
     offered[first.effects]["payload_com"] = [close]
-    assert search_module.exchanged(problem, first, base, willing)[0] is first
+    assert exchange.exchanged(problem, first, base, willing)[0] is first
     without["deadband"] = scored(("payload_com",), 298.0)
-    last = search_module.exchanged(problem, first, base, willing)[0]
+    last = exchange.exchanged(problem, first, base, willing)[0]
     assert last is without["deadband"]
 
 
