@@ -3,19 +3,16 @@
 A logged effort that jumps with its targets is noisy, and a spring or a limit that the
 equations then do not show moves the angle by many times its noise. A search by the
 error of the angle, as where no effort was logged, may do better, and counts if it
-leaves less than the first and next to nothing. The effort did not show what it names,
-so much of the angle's error has to go, however little remains.
+leaves next to nothing, and as much less than the first answer as a cause has to.
 """
 
 from sysid.diagnosis.fits.candidate import Model
-from sysid.diagnosis.search.judge import Judge
+from sysid.diagnosis.search.judge import LEAST_FALL, Judge
 from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
 FAR_LESS = 0.25
-"""Least share of the error of held-out angles that goes with the answer of such a
-search."""
-
+"""Least share of an angle's error that goes with a cause in the joint beside it."""
 
 SEARCHED = 1.3
 """Mean squared error of the angle, in units of its noise, that is searched. Of 31
@@ -43,20 +40,17 @@ def explains(before: float, after: float) -> bool:
     return fall > FAR_LESS and not leaves_much(before, after)
 
 
-def explained(judge: Judge, base: Model, best: Model, first: Model) -> bool:
-    """Whether the answer of such a search explains the angle, by what it predicts.
+def explained(base: Model, best: Model, first: Model) -> bool:
+    """Whether the answer of such a search explains what the first answer did not.
 
     Args:
-        judge: of the search of the angle.
-        base: its nominal model.
-        best: its answer.
+        base: the nominal model, fitted to the angle.
+        best: the answer of the search.
         first: the answer of the equations, fitted to the angle.
     """
     if not best.effects or leaves_much(base.errors[1], best.errors[1]):
         return False
-    if best.errors[1] >= first.errors[1]:
-        return False
-    return judge.fall(*judge.pair(base, best)) > FAR_LESS
+    return 1.0 - (best.errors[1] / first.errors[1]) ** 0.5 > LEAST_FALL
 
 
 def unsolved(

@@ -150,8 +150,7 @@ def _by_angle(found: Search) -> Search:
         return found
     again = _searched(*start)
     first = nearest(found.judge, found.best)
-    better = explained(again.judge, again.base, again.best, first)
-    return again if better else found
+    return again if explained(again.base, again.best, first) else found
 
 
 def _searched(problem: Problem, base: Model, known: Model | None = None) -> Search:
