@@ -55,8 +55,9 @@ def decided_by_angle(
     for m in sorted(asked, key=lambda m: -ahead[m.effects]):
         least = max(threshold_of(judge.problem, m), NESTED_SHARE * gain)
         if ahead[m.effects] > least and judge.confirms(base, m):
-            leads = {e: ahead[m.effects] - by for e, by in ahead.items()}
-            leads |= {best.effects: ahead[m.effects], (): _by_angle(judge, base, m)}
+            lead = ahead.pop(m.effects)
+            leads = {e: lead - by for e, by in ahead.items()}
+            leads |= {best.effects: lead, (): _by_angle(judge, base, m)}
             return Decided(m, leads)
     return None
 

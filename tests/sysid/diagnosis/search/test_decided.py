@@ -84,7 +84,7 @@ def test_what_the_angle_prefers_by_more_takes_the_place(monkeypatch):
     assert said is not None
     assert said.best is COUPLED
     # By angle, less what it is behind in the equations, of each.
-    leads = {("payload_com",): 293.0, ("stiffness",): 251.0, ("joint_coupling",): 0.0}
+    leads = {("payload_com",): 293.0, ("stiffness",): 251.0}
     assert said.leads == leads | {(): 600.0}
 
 

@@ -49,19 +49,12 @@ def test_where_the_angle_decided_alternatives_are_behind_by_it():
     """The equations' answer is ahead of it in the equations, and refuted."""
     best, base = model("joint_coupling", 10.0), model("", 24.0, moved=50.0)
     first, close = model("payload_com", 0.0, 9.0), model("stiffness", 9.0, 9.0)
+    other = model("armature", 11.0, 9.0)  # it was not asked
     judge = SimpleNamespace(prefers=lambda smaller, larger: True)
-    others = ({"joint_coupling": [first, close]}, {"joint_coupling": base}, [])
-    leads = {("payload_com",): 300.0, ("stiffness",): 1.0, (): 600.0}
+    others = ({"joint_coupling": [first, close, other]}, {"joint_coupling": base}, [])
+    leads = {("payload_com",): 300.0, ("stiffness",): 2.0, (): 600.0}
     found = Search(None, base, best, *others, SAMPLES, judge, leads)
-    near, far = alternatives_of(found)
-    assert (near.effect, near.score_gap, near.distinguishable) == (
-        "stiffness",
-        1,
-        False,
-    )
-    assert (far.effect, far.score_gap, far.distinguishable) == (
-        "payload_com",
-        300,
-        True,
-    )
+    said = {a.effect: (a.score_gap, a.distinguishable) for a in alternatives_of(found)}
+    near, far = (2.0, False), (300.0, True)
+    assert said == {"stiffness": near, "armature": near, "payload_com": far}
     assert found.gain("joint_coupling") == 600.0
