@@ -53,7 +53,8 @@ def decided_by_angle(
     gain = _by_angle(judge, base, best)
     ahead = {m.effects: _ahead(judge, best, m) for m in asked}
     for m in sorted(asked, key=lambda m: -ahead[m.effects]):
-        least = max(threshold_of(judge.problem, m), NESTED_SHARE * gain)
+        needed = threshold_of(judge.problem, m, m.effects)
+        least = max(needed, NESTED_SHARE * gain)
         if ahead[m.effects] > least and judge.confirms(base, m):
             lead = ahead.pop(m.effects)
             leads = {e: lead - by for e, by in ahead.items()}

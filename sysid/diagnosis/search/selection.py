@@ -4,6 +4,8 @@ A larger model is accepted if its log-likelihood gain on held-out folds exceeds 
 threshold and it removes enough of the error of the residual in which it acts.
 """
 
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Float
 
@@ -55,7 +57,7 @@ def accepted(problem: Problem, smaller: Model, larger: Model, base: Model) -> bo
         return gain > max(NOMINAL_THRESHOLD, least)
     if not plausible(problem, smaller, larger):
         return False
-    threshold = _threshold(problem, larger, added)
+    threshold = threshold_of(problem, larger, added)
     removes = _removes_enough(problem, smaller, larger, base)
     return gain > max(threshold, least) and removes
 
@@ -75,21 +77,17 @@ def plausible(problem: Problem, smaller: Model, larger: Model) -> bool:
     return not friction or _predicts_effort(problem, smaller, larger)
 
 
-def threshold_of(problem: Problem, model: Model) -> float:
-    """What the effects of a model must gain [nat].
+def threshold_of(problem: Problem, model: Model, added: Sequence[str]) -> float:
+    """What effects must gain, beyond what the best of many grids gains by chance [nat].
 
     Args:
         problem: of the joint.
-        model: a fitted model.
+        model: a fitted model with the effects.
+        added: their names.
 
     Source:
-        Ours; `THRESHOLD` and what chance adds to it.
+        Ours.
     """
-    return _threshold(problem, model, list(model.effects))
-
-
-def _threshold(problem: Problem, model: Model, added: list[str]) -> float:
-    """What effects must gain, beyond what the best of many grids gains by chance."""
     if "compliance" in added:
         return SPRING_THRESHOLD
     if "command_quantization" in added:

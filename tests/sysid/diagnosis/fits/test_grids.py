@@ -14,7 +14,7 @@ from sysid.diagnosis.diagnose import problem_of
 from sysid.diagnosis.fits.grids import chance_gain, grid_optima
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.diagnosis.search.search import settled
-from sysid.diagnosis.search.selection import THRESHOLD, _threshold
+from sysid.diagnosis.search.selection import THRESHOLD, threshold_of
 
 
 @pytest.mark.parametrize("step_rad", [0.005, 0.03])
@@ -43,6 +43,6 @@ def test_the_finer_a_grid_the_more_of_it_is_chance():
     more = chance_gain(problem, fine) - chance_gain(problem, coarse)
     assert more == pytest.approx(np.log(10.0), rel=0.01)
     model = SimpleNamespace(fit=SimpleNamespace(theta=fine))
-    needed = _threshold(problem, model, ["command_quantization"])
+    needed = threshold_of(problem, model, ["command_quantization"])
     assert needed == THRESHOLD + chance_gain(problem, fine)
-    assert _threshold(problem, model, ["deadband"]) == THRESHOLD
+    assert threshold_of(problem, model, ["deadband"]) == THRESHOLD

@@ -62,7 +62,7 @@ def implausible(monkeypatch):
 
     monkeypatch.setattr(decided, "likelihood_gap", gap)
     monkeypatch.setattr(decided, "plausible", plausible)
-    monkeypatch.setattr(decided, "threshold_of", lambda problem, model: 12.0)
+    monkeypatch.setattr(decided, "threshold_of", lambda *args: 12.0)
     monkeypatch.setattr(decided, "nearest", lambda judge, m: judge.moved(m))
     return names
 
