@@ -9,6 +9,7 @@ from sysid.diagnosis.fits.candidate import Model, off_prior
 from sysid.diagnosis.fits.grids import grid_optima
 from sysid.diagnosis.fits.origins import near_nominal
 from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.projected import linear_costs
 
 AROUND = (0.02, 0.002)
 """Logarithms around the best start within which local optima are searched."""
@@ -58,7 +59,7 @@ def best_starts(
     Returns:
         Starts of every effect, the best one first.
     """
-    owned = [(n, t) for n in names for t in _tried(problem, model, origin, n)]
+    owned = [(n, t) for n in names for t in tried(problem, model, origin, n)]
     if not owned:
         return {}
     thetas = np.stack([origin, *(t for _, t in owned)])
@@ -88,8 +89,20 @@ def valleys(costs: Sequence[float]) -> list[int]:
     return [i for i in inner if costs[i] < min(costs[i - 1], costs[i + 1])]
 
 
-def _tried(problem: Problem, model: Model, origin: np.ndarray, name: str) -> list:
-    """Returns the coordinates that are tried for an effect."""
+def tried(
+    problem: Problem, model: Model, origin: Float[np.ndarray, " n"], name: str
+) -> list[Float[np.ndarray, " n"]]:
+    """Returns the coordinates that are tried for an effect.
+
+    Args:
+        problem: residuals of a joint.
+        model: whose nuisance parameters follow, where the error has many optima.
+        origin: coordinates of all else [1].
+        name: of the effect.
+
+    Source:
+        Ours.
+    """
     if not many_optima(problem, name):
         return [_placed(origin, start) for start in problem.space.starts(name)]
     index = problem.space.of(name)[0]
@@ -113,29 +126,3 @@ def _placed(origin: np.ndarray, start: dict[int, float]) -> np.ndarray:
 def many_optima(problem: Problem, name: str) -> bool:
     """Whether the error has many optima over an effect's parameter."""
     return problem.space.slots[problem.space.of(name)[0]].many_optima
-
-
-def linear_costs(
-    problem: Problem, model: Model, thetas: Float[np.ndarray, "c n"]
-) -> Float[np.ndarray, " c"]:
-    """What remains when the nuisance parameters follow linearly: ‖(I − Q Qᵀ) r(θ)‖².
-
-    Args:
-        problem: residuals of a joint.
-        model: whose Jacobian J = Q R, with that of the priors, they follow.
-        thetas: coordinates θ [1].
-
-    Source:
-        Variable projection: G. H. Golub, V. Pereyra, The Differentiation of
-        Pseudo-Inverses and Nonlinear Least Squares Problems Whose Variables Separate,
-        SIAM Journal on Numerical Analysis 10(2), 1973; at slopes of one place.
-    """
-    rs = problem.residual(thetas)
-    fit, space = model.fit, problem.space
-    prior_sd = space.prior_sds(model.effects)[fit.free]
-    j = np.concatenate([fit.jacobian, np.diag(1.0 / prior_sd)])
-    center = (thetas - space.nominal)[:, fit.free] / prior_sd
-    full = np.concatenate([rs, center], 1)
-    q, _ = np.linalg.qr(j)
-    cost = np.sum(full**2, 1) - np.sum((full @ q) ** 2, 1)
-    return np.where(np.isfinite(cost), cost, np.inf)

@@ -20,11 +20,12 @@ from sysid.diagnosis.fits.origins import (
     put_back,
     with_effects,
 )
+from sysid.diagnosis.fits.secants import along_secants
 from sysid.diagnosis.fits.starts import (
     FAR_SD,
     best_starts,
-    linear_costs,
     many_optima,
+    tried,
 )
 from sysid.diagnosis.simulated.output_error import OutputProblem
 
@@ -33,8 +34,8 @@ EQUATIONS_TRIED = 3
 
 ALONE_TRIED = 3
 """The same of those that come nearest to it when they are fitted alone: at nominal, in
-the smaller model, and there with what has left its tolerance put back, each; and as
-they begin there, if the nuisance parameters follow them."""
+the smaller model, and there with what has left its tolerance put back, each; and there
+of the size that says most, if the nuisance parameters follow."""
 
 
 def settled_output(
@@ -100,29 +101,33 @@ def output_starts(
         ranked = np.argsort(costs(problem, sets, thetas))
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
     starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
-    starts += _followed(problem, smaller, proposed, own)
+    starts += _followed(problem, smaller, proposed)
     return starts + _with_others_back(problem, smaller, proposed)
 
 
 def _followed(
-    problem: OutputProblem, smaller: Model, proposed: list[Model], own: dict[str, list]
+    problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns the effects' own starts beside which the nuisance parameters do most.
+    """Returns starts beside which the nuisance parameters do most, of likely sizes.
 
-    What is one of these parameters itself follows, and a limit that is not met changes
-    nothing: both leave as much as is there, and are no starts.
+    What is one of these parameters itself follows, and what changes nothing towards the
+    records has nowhere to go: both are no starts.
     """
     begin = [
-        (m.effects, own[e][0])
+        (m.effects, theta)
         for m in proposed
         for e in m.effects[-1:]
-        if e in own and not problem.space.has_nominal(e)
+        if not (many_optima(problem, e) or problem.space.has_nominal(e))
+        for theta in tried(problem, smaller, smaller.fit.theta, e)
     ]
-    thetas = np.stack([smaller.fit.theta, *(theta for _, theta in begin)])
-    rest, *left = linear_costs(problem, smaller, thetas)
-    idle = np.isclose(left, rest, rtol=1e-6, atol=0.0)
-    ranked = [k for k in np.argsort(left).tolist() if not idle[k]]
-    return [begin[k] for k in ranked[:ALONE_TRIED]]
+    if not begin:
+        return []
+    starts, left = along_secants(problem, smaller, np.stack([u for _, u in begin]))
+    nearest: dict[tuple[str, ...], Float[np.ndarray, " n"]] = {}
+    for k in np.argsort(left).tolist():
+        if not np.array_equal(starts[k], smaller.fit.theta):
+            nearest.setdefault(begin[k][0], starts[k])
+    return list(nearest.items())[:ALONE_TRIED]
 
 
 def _own_starts(
@@ -165,8 +170,8 @@ def _beside(
     """
     names = [m.effects[-1] for m in proposed]
     said = [with_effects(problem, origin, m, m.effects[-1:]) for m in proposed]
-    tried = [own.get(name, [u])[0] for name, u in zip(names, said, strict=True)]
+    begun = [own.get(name, [u])[0] for name, u in zip(names, said, strict=True)]
     sets, rest = [m.effects for m in proposed], [origin] * len(names)
-    first, second, idle = (costs(problem, sets, x) for x in (said, tried, rest))
+    first, second, idle = (costs(problem, sets, x) for x in (said, begun, rest))
     still = np.isclose(first, idle, rtol=1e-6, atol=0.0)
-    return list(np.where((still | (second < first))[:, None], tried, said))
+    return list(np.where((still | (second < first))[:, None], begun, said))
