@@ -55,7 +55,8 @@ def with_command(setup: Setup, command: Sequence[float]) -> Setup:
     ranges = [(float(value), float(value)) for value in command]
     fields = ("vel_x_mps", "vel_y_mps", "yaw_rate_rps")
     fixed = dict(zip(fields, ranges, strict=True))
-    shares = {f"{kind}_fraction": 0.0 for kind in ("standing", "turning", "straight")}
+    names = (field.name for field in dataclasses.fields(setup.env.command))
+    shares = {name: 0.0 for name in names if name.endswith("_fraction")}
     changed = dataclasses.replace(setup.env.command, **fixed, **shares)
     return with_fields(setup, command=changed)
 

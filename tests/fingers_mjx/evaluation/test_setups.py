@@ -1,15 +1,23 @@
 """What an evaluation changes of the settings of the training."""
 
+import dataclasses
+
 import jax
 import numpy as np
+import pytest
 from support.cli_setup import make_setup
 
 from envs.commands import sample_command
-from fingers_mjx.evaluation.setups import nominal, with_command
+from fingers_mjx.evaluation.setups import nominal, with_command, with_fields
 
 
-def test_one_command_leaves_nothing_to_chance():
-    command = with_command(make_setup(), (0.1, -0.05, 0.3)).env.command
+@pytest.mark.parametrize("kind", ["standing", "turning", "straight", "sideways"])
+def test_one_command_leaves_nothing_to_chance(kind):
+    """Whatever commands the policy was trained with."""
+    setup = make_setup()
+    mixture = dataclasses.replace(setup.env.command, **{f"{kind}_fraction": 0.9})
+    mixed = with_fields(setup, command=mixture)
+    command = with_command(mixed, (0.1, -0.05, 0.3)).env.command
     for seed in range(20):
         drawn = sample_command(jax.random.key(seed), command)
         np.testing.assert_allclose(drawn, [0.1, -0.05, 0.3], atol=1e-7)
