@@ -18,7 +18,7 @@ from benchmarks.diagnosis.score import Row, confusion, read_rows, statistics
 from envs.config.atomic_file import write_atomic
 from sysid.diagnosis.verdict.posterior import CALIBRATION
 
-SEED, PLANNED, COMMIT = 5941680, 700, "96ad1ba"
+SEED, PLANNED, COMMIT = 803326, 700, "8a5b944"
 ROWS = Path(f"benchmarks/results/battery-wide-{SEED}.jsonl")
 PAGE = Path("docs/results/battery.md")
 FIGURE = Path("docs/images/reliability.png")
