@@ -51,8 +51,9 @@ _GRIDS = {
 _STEP_RANGE = (0.015, 1.0)
 _RECIPROCAL = {
     # Where no effort was logged, what a servo would ask for at once may be thirty times
-    # what it gives behind a slow low-pass: a limit has no slope until it is met.
-    "N·m": (1.0, 1.2, 1.6, 2.4, 4.0, 7.0, 12.0, 20.0, 34.0),
+    # what it gives behind a slow low-pass, and more if its gains are unknown: a limit
+    # has no slope until it is met, and a joint falls at two thirds of that.
+    "N·m": tuple(np.geomspace(1.0, 400.0, 43).tolist()),
     # From 2 ms, which a stiff servo takes for a step, to 1 s until the speed is that of
     # the records.
     "rad/s²": tuple(np.geomspace(0.02, 10.0, 22).tolist()),
@@ -187,7 +188,7 @@ def _slot(effect: str, name: str, parameter: Parameter, size: float | None) -> S
     elif math.isinf(identity):
         scale = size if size is not None else parameter.prior.center
         starts = _RECIPROCAL.get(parameter.unit, (0.1, 0.3, 1.0, 2.0))
-        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 50.0,
+        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 500.0,
                     0.0, starts, True)  # fmt: skip
     elif identity == 1.0:
         slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,

@@ -19,6 +19,10 @@ SEARCHED = 1.3
 joints without an effect, with repeats, at most 1.24 is left; to say that it is
 unexplained takes more (`LEFT`)."""
 
+SEARCHED_ALONE = 1.0
+"""The same without repeats: the noise is taken too large then, up to twice its square,
+and an effect may hide in that."""
+
 
 def nearest(judge: Judge, model: Model) -> Model:
     """Returns the nearer fit to the angle: with all free, or with the effort's gains.
@@ -68,8 +72,9 @@ def unsolved(
     if output is judge.problem or not isinstance(output, OutputProblem):
         return None
     # Without repeats its noise is what neighbouring readings do not share.
+    least = SEARCHED if output.repeat else SEARCHED_ALONE
     before, after = nearest(judge, base), nearest(judge, best)
-    if not leaves_much(before.errors[1], after.errors[1], SEARCHED):
+    if not leaves_much(before.errors[1], after.errors[1], least):
         return None
     if not best.effects:
         output.stages.setdefault((), stage)

@@ -36,7 +36,8 @@ def test_much_is_more_than_noise_and_than_what_a_model_errs_by():
     [
         (6.2, 6.2, True, True),
         (6.2, 6.2, False, True),  # noise is what neighbouring readings do not share
-        (1.2, 1.2, False, False),
+        (1.2, 1.2, False, True),  # and taken too large
+        (0.9, 0.9, False, False),
         (1.2, 1.2, True, False),
         (1.8, 1.8, True, True),  # too little to be unexplained, and worth a search
         (9.0, 1.1, True, False),
