@@ -19,8 +19,8 @@ def along_secants(
 
     Along each line the residual goes from r_0 to r_s as if it were linear, and the
     nuisance parameters follow: a = −d·r_0 / d·d within 0 to 1, of d = r_s − r_0 and r_0
-    without what these parameters explain. The error is ‖r_0 + a d‖². A start at which
-    the simulation diverges is no way: a is 0.
+    without what these parameters explain. The error is ‖r_0 + a d‖². A start without
+    a finite error is no way: a is 0.
 
     Args:
         problem: residuals of a joint.

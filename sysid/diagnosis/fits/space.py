@@ -52,7 +52,7 @@ _STEP_RANGE = (0.015, 1.0)
 _RECIPROCAL = {
     # Where no effort was logged, what a servo would ask for at once may be thirty times
     # what it gives behind a slow low-pass, and more if its gains are unknown: a limit
-    # has no slope until it is met, and a joint falls at two thirds of that.
+    # has no slope until it is met, and a joint falls at two thirds of what it needs.
     "N·m": tuple(np.geomspace(1.0, 400.0, 43).tolist()),
     # From 2 ms, which a stiff servo takes for a step, to 1 s until the speed is that of
     # the records.

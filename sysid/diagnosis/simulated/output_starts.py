@@ -35,7 +35,7 @@ EQUATIONS_TRIED = 3
 ALONE_TRIED = 3
 """The same of those that come nearest to it when they are fitted alone: at nominal, in
 the smaller model, and there with what has left its tolerance put back, each; and there
-of the size that says most, if the nuisance parameters follow."""
+of the size that a secant says, if the nuisance parameters follow."""
 
 
 def settled_output(
@@ -108,10 +108,10 @@ def output_starts(
 def _followed(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns starts beside which the nuisance parameters do most, of likely sizes.
+    """Returns the starts nearest by secants, where the nuisance parameters follow.
 
-    What is one of these parameters itself follows, and what changes nothing towards the
-    records has nowhere to go: both are no starts.
+    What is one of these parameters itself follows, and what leads away from the records
+    has nowhere to go: both are no starts. Nothing is simulated at the sizes returned.
     """
     begin = [
         (m.effects, theta)
