@@ -14,13 +14,14 @@ from sysid.diagnosis.fits.projected import unexplained_by
 
 def along_secants(
     problem: Problem, model: Model, starts: Float[np.ndarray, "c n"]
-) -> tuple[Float[np.ndarray, "c n"], Float[np.ndarray, " c"]]:
-    """Returns θ_0 + a (θ_s − θ_0) with the a of least error, and that error.
+) -> Float[np.ndarray, "c n"]:
+    """Returns θ_0 + a (θ_s − θ_0) with the a that would have the least error.
 
     Along each line the residual goes from r_0 to r_s as if it were linear, and the
     nuisance parameters follow: a = −d·r_0 / d·d within 0 to 1, of d = r_s − r_0 and r_0
-    without what these parameters explain. The error is ‖r_0 + a d‖². A start without
-    a finite error is no way: a is 0.
+    without what these parameters explain. Nothing is simulated there: the error may be
+    another. Of a start that diverges, which has a huge error, a is next to 0; without a
+    finite one it is 0.
 
     Args:
         problem: residuals of a joint.
@@ -35,6 +36,5 @@ def along_secants(
     change = np.array(rest) - first
     change[~np.isfinite(change).all(1)] = 0.0
     power = np.maximum(np.sum(change**2, 1), 1e-300)
-    share = np.clip(-(change @ first) / power, 0.0, 1.0)[:, None]
-    left = np.sum((first + share * change) ** 2, 1)
-    return origin + share * (starts - origin), left
+    share = np.clip(-(change @ first) / power, 0.0, 1.0)
+    return origin + share[:, None] * (starts - origin)

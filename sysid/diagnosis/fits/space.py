@@ -188,7 +188,8 @@ def _slot(effect: str, name: str, parameter: Parameter, size: float | None) -> S
     elif math.isinf(identity):
         scale = size if size is not None else parameter.prior.center
         starts = _RECIPROCAL.get(parameter.unit, (0.1, 0.3, 1.0, 2.0))
-        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, 500.0,
+        high = max(50.0, 1.25 * max(starts))
+        slot = Slot(effect, name, parameter.unit, "reciprocal", scale, 0.0, 0.0, high,
                     0.0, starts, True)  # fmt: skip
     elif identity == 1.0:
         slot = Slot(effect, name, parameter.unit, "log", 1.0, 0.0, -4.0, 4.0, 0.0,

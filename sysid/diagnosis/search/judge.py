@@ -47,7 +47,7 @@ from sysid.diagnosis.search.remains import LEFT, becomes_noise
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
-from sysid.diagnosis.simulated.output_starts import settled_output
+from sysid.diagnosis.simulated.settled_output import settled_output
 
 LEVEL = 1.0
 """Least t of a difference that counts."""

@@ -31,7 +31,7 @@ from sysid.diagnosis.search.stage import (
     still_accepted,
 )
 from sysid.diagnosis.simulated.output_error import output_problem
-from sysid.diagnosis.simulated.output_starts import settled_output
+from sysid.diagnosis.simulated.settled_output import settled_output
 
 STRAINED = 25.0
 """Squared prior deviations of the nuisance parameters that are no accident [1]."""

@@ -12,14 +12,9 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
-from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
-from sysid.diagnosis.fits.clock import without_drift
-from sysid.diagnosis.fits.origins import (
-    at_nominal,
-    near_nominal,
-    put_back,
-    with_effects,
-)
+from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.origins import at_nominal, put_back, with_effects
+from sysid.diagnosis.fits.projected import linear_costs
 from sysid.diagnosis.fits.secants import along_secants
 from sysid.diagnosis.fits.starts import (
     FAR_SD,
@@ -37,32 +32,8 @@ ALONE_TRIED = 3
 the smaller model, and there with what has left its tolerance put back, each; and there
 of the size that a secant says, if the nuisance parameters follow."""
 
-
-def settled_output(
-    output: OutputProblem, equations: Model
-) -> tuple[OutputProblem, Model]:
-    """Fits the nuisance parameters to the angle and estimates the noise, in turns.
-
-    Args:
-        output: the error of the angle, of unit noise.
-        equations: a model by the equations.
-
-    Returns:
-        The problem with its noise, and the model of the same effects.
-    """
-    effects = equations.effects
-    fitted = equations.fit.theta
-    begin = at_nominal(output, equations), near_nominal(output, equations)
-    starts = np.stack([*begin, fitted])
-    raw = output.raw(starts, weigh=False)
-    nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
-    problem = output.with_noise(without_drift(output, nearest))
-    models = fit_models(
-        problem, [effects] * len(starts), list(starts), rounds=CONVERGED
-    )
-    theta = min(models, key=lambda m: m.fit.cost).fit.theta
-    problem = output.with_noise(without_drift(output, theta))
-    return problem, fit_models(problem, [effects], [theta])[0]
+NEARER = 1e-6
+"""Share of the smaller model's error by which a start of a secant's size is nearer."""
 
 
 def output_starts(
@@ -108,10 +79,10 @@ def output_starts(
 def _followed(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns the starts nearest by secants, where the nuisance parameters follow.
+    """Returns the nearest of what secants say, where the nuisance parameters follow.
 
-    What is one of these parameters itself follows, and what leads away from the records
-    has nowhere to go: both are no starts. Nothing is simulated at the sizes returned.
+    What is one of these parameters itself follows, and what comes no nearer than the
+    smaller model leads away from the records: both are no starts.
     """
     begin = [
         (m.effects, theta)
@@ -122,10 +93,12 @@ def _followed(
     ]
     if not begin:
         return []
-    starts, left = along_secants(problem, smaller, np.stack([u for _, u in begin]))
+    starts = along_secants(problem, smaller, np.stack([u for _, u in begin]))
+    thetas = np.stack([smaller.fit.theta, *starts])
+    rest, *left = linear_costs(problem, smaller, thetas)
     nearest: dict[tuple[str, ...], Float[np.ndarray, " n"]] = {}
     for k in np.argsort(left).tolist():
-        if not np.array_equal(starts[k], smaller.fit.theta):
+        if left[k] < (1.0 - NEARER) * rest:
             nearest.setdefault(begin[k][0], starts[k])
     return list(nearest.items())[:ALONE_TRIED]
 

@@ -36,7 +36,7 @@ from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.search.selection import MODEL_ERROR, PLAUSIBLE_SD
 from sysid.diagnosis.simulated.output_error import OutputProblem
-from sysid.diagnosis.simulated.output_starts import settled_output
+from sysid.diagnosis.simulated.settled_output import settled_output
 from sysid.diagnosis.verdict.dependence import depends_on
 
 OUTLIER_SD = 8.0

@@ -19,7 +19,7 @@ from sysid.diagnosis.search.parts import in_parts
 from sysid.diagnosis.search.selection import THRESHOLD
 from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.simulated.output_error import output_problem
-from sysid.diagnosis.simulated.output_starts import settled_output
+from sysid.diagnosis.simulated.settled_output import settled_output
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism

@@ -8,6 +8,7 @@ import pytest
 from support.plain_servo import KD, KP, problem_with
 
 from sysid.diagnosis.fits.candidate import fit_models
+from sysid.diagnosis.fits.projected import linear_costs
 from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.simulated.closed_loop import Known, simulated
 from sysid.diagnosis.simulated.output_error import output_problem
@@ -15,8 +16,8 @@ from sysid.diagnosis.simulated.output_starts import (
     ALONE_TRIED,
     EQUATIONS_TRIED,
     output_starts,
-    settled_output,
 )
+from sysid.diagnosis.simulated.settled_output import settled_output
 
 
 def scales(problem, theta):
@@ -78,6 +79,25 @@ def test_an_effect_that_shrinks_beside_what_took_its_place_is_tried(unknown):
         if e[0] == "backlash"
     ]
     assert 0.15 in begun
+
+
+@pytest.mark.parametrize("name", ["load_friction", "deadband"])
+def test_an_effect_of_a_twentieth_of_its_start_is_tried(unknown, name):
+    """The nuisance parameters take up most of it; where they follow, all is left."""
+    problem, base = settled_output(*unknown)
+    index, true = problem.space.of(name)[0], base.fit.theta.copy()
+    true[index] = problem.space.slots[index].starts[0] / 20.0
+    pos = jnp.asarray(simulated(problem, true[None])[0], jnp.float32)
+    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
+    problem = replace(problem, data=data, seen=Known())
+    (base,) = fit_models(problem, [()], [base.fit.theta])
+    sets = [(other,) for other in ("encoder_offset", "payload_mass", "armature", name)]
+    proposed = fit_models(problem, sets, [base.fit.theta] * len(sets), rounds=0)
+    begun = [t for e, t in output_starts(problem, base, proposed) if e == (name,)]
+    nearest = min(begun, key=lambda t: abs(t[index] - true[index]))
+    assert nearest[index] == pytest.approx(true[index], rel=0.1)
+    rest, left = linear_costs(problem, base, np.stack([base.fit.theta, nearest]))
+    assert left < 0.5 * rest
 
 
 def test_a_limit_begins_in_the_direction_in_which_it_acts(unknown):

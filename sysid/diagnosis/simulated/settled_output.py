@@ -1,0 +1,35 @@
+"""The model that lacks an effect, fitted to the simulated angle; the noise there."""
+
+import numpy as np
+
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
+from sysid.diagnosis.fits.clock import without_drift
+from sysid.diagnosis.fits.origins import at_nominal, near_nominal
+from sysid.diagnosis.simulated.output_error import OutputProblem
+
+
+def settled_output(
+    output: OutputProblem, equations: Model
+) -> tuple[OutputProblem, Model]:
+    """Fits the nuisance parameters to the angle and estimates the noise, in turns.
+
+    Args:
+        output: the error of the angle, of unit noise.
+        equations: a model by the equations.
+
+    Returns:
+        The problem with its noise, and the model of the same effects.
+    """
+    effects = equations.effects
+    fitted = equations.fit.theta
+    begin = at_nominal(output, equations), near_nominal(output, equations)
+    starts = np.stack([*begin, fitted])
+    raw = output.raw(starts, weigh=False)
+    nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
+    problem = output.with_noise(without_drift(output, nearest))
+    models = fit_models(
+        problem, [effects] * len(starts), list(starts), rounds=CONVERGED
+    )
+    theta = min(models, key=lambda m: m.fit.cost).fit.theta
+    problem = output.with_noise(without_drift(output, theta))
+    return problem, fit_models(problem, [effects], [theta])[0]
