@@ -21,7 +21,8 @@ repeats show that the logged effort has no other explanation: what parameters a 
 out of their tolerances hide of the angle, as a servo's damping hides friction, they do
 not hide of the effort, whose error then must fall by `LEAST_FALL_OF_EFFORT`. An angle
 that does not show the cause need not come nearer by `LEVEL` either, which chance would
-decide: it must come nearer at all.
+decide: it must come nearer at all. Where the angle does show it, and `t` is for it, an
+effort that falls so far is enough to matter, too, whatever is left of it.
 """
 
 from dataclasses import replace
@@ -246,18 +247,21 @@ class Judge:
         return self.prefers(smaller, larger) and self._matters(smaller, larger)
 
     def _matters(self, smaller: Model, larger: Model) -> bool:
-        """Whether much goes of an error of angle or explained effort, or all but noise.
+        """Whether much goes of an error of angle or effort, or all but noise.
 
+        An effort counts where it is explained, or where the angle shows the cause too.
         Noise is of repeats, or what neighbouring readings of the angle do not share: by
         the same noise the verdict would be that something is unexplained. Repeats show
         all of it, neighbours only a part: by these what is left may be noise.
         """
         worse, better = self.pair(smaller, larger)
         left = (larger.errors.max() / smaller.errors.max()) ** 0.5
-        explained = (
-            self._explains(smaller, larger) and 1.0 - left > LEAST_FALL_OF_EFFORT
-        )
-        if explained or self.fall(worse, better) > LEAST_FALL:
+        shown = self._explains(smaller, larger)
+        if self.output is not self.problem:  # the effort is apart from the angle
+            shown = shown or self.shows(smaller, larger)
+        if shown and 1.0 - left > LEAST_FALL_OF_EFFORT:
+            return True
+        if self.fall(worse, better) > LEAST_FALL:
             return True
         before, after = worse.errors.max(), better.errors.max()
         if self.problem.repeat:

@@ -136,6 +136,29 @@ def test_such_an_effort_matters_itself_where_little_goes_of_the_angle(
     assert says(Said(6.4, t, fall=0.02), before, after) is counts
 
 
+@pytest.mark.parametrize(
+    ("gain", "t", "after", "counts"),
+    [
+        (ENOUGH, 2.0 * LEVEL, 1.0, True),
+        (ENOUGH, 2.0 * LEVEL, 1.2, False),
+        (ENOUGH, 0.5 * LEVEL, 1.0, False),
+        (0.5 * NOMINAL_THRESHOLD, 2.0 * LEVEL, 1.0, False),
+    ],
+)
+def test_an_effort_that_falls_far_matters_where_the_angle_shows_the_cause(
+    gain, t, after, counts
+):
+    """Viscous friction: a ninth goes of the angle by 74 nat, and 42 % of the effort."""
+    assert says(Said(gain, t, fall=0.11), 1.9, after) is counts
+
+
+def test_of_an_angle_alone_the_error_that_was_fitted_is_no_such_effort():
+    judge = Said(ENOUGH, 2.0 * LEVEL, fall=0.11)
+    judge.output = judge.problem
+    judge.problem.samples = 4
+    assert not says(judge, 1.9, 1.0)
+
+
 def test_an_angle_that_does_not_show_it_need_only_come_nearer_at_all():
     """Viscous friction behind gains known to half: t of 1.05, or by chance of 0.9."""
     assert says(Said(-0.7, 0.1 * LEVEL, fall=0.0), before=5.8, after=1.0)
