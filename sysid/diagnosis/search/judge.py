@@ -44,7 +44,7 @@ from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.fits.tolerances import within_tolerances
 from sysid.diagnosis.replay.band import EVERY, sample_rows
-from sysid.diagnosis.search.remains import LEFT, becomes_noise
+from sysid.diagnosis.search.remains import LEFT, becomes_noise, explains_effort
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
@@ -66,10 +66,6 @@ right causes that a quarter of the root refused.
 
 LEAST_FALL_OF_EFFORT = 0.25
 """The same of the effort's error: it crosses a line of noise when it falls by less."""
-
-LITTLE = 0.01
-"""Share of a squared error below which next to nothing of it is left; friction that
-cancels four fifths of a torque leaves 0.04."""
 
 GAIN_TOLERANCE = 0.05
 """Least tolerance of gains that the effort shows [1]."""
@@ -289,13 +285,8 @@ class Judge:
         return gain > NOMINAL_THRESHOLD
 
     def _explains(self, smaller: Model, larger: Model) -> bool:
-        """Whether only the larger model leaves little more than noise in the effort.
-
-        Without repeats what is noise is not known, and it must leave next to nothing.
-        """
-        before, after = smaller.errors.max(), larger.errors.max()
+        """Whether only the larger model leaves little more than noise in the effort."""
         if not self.problem.data.effort.any():
             return False
-        if not self.problem.repeat:
-            return bool(before > LEFT and after < LITTLE * before)
-        return becomes_noise(before, after)
+        before, after = smaller.errors.max(), larger.errors.max()
+        return explains_effort(before, after, bool(self.problem.repeat))

@@ -10,6 +10,10 @@ REMAINING = 0.2
 equation is right to half of its trace. Of a friction that falls with speed 0.17 remains
 about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
 
+LITTLE = 0.01
+"""Share of a squared error below which next to nothing of it is left; friction that
+cancels four fifths of a torque leaves 0.04."""
+
 
 def leaves_much(before: float, after: float, noise: float = LEFT) -> bool:
     """Whether of an error before causes more is left than noise and model error.
@@ -39,3 +43,18 @@ def becomes_noise(before: float, after: float) -> bool:
         Ours; `LEFT` and `REMAINING`.
     """
     return bool(before > LEFT > after and after - 1.0 < REMAINING * (before - 1.0))
+
+
+def explains_effort(before: float, after: float, repeats: bool) -> bool:
+    """Whether of the error of a logged effort little more than noise is left.
+
+    Without repeats what is noise is not known, and next to nothing must be left.
+
+    Args:
+        before: mean squared error without a cause, in units of its noise [1].
+        after: the same with it [1].
+        repeats: whether motions repeat.
+    """
+    if repeats:
+        return becomes_noise(before, after)
+    return bool(before > LEFT and after < LITTLE * before)
