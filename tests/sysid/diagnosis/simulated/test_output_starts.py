@@ -27,6 +27,13 @@ def scales(problem, theta):
     return found["stiffness.scale"], found["damping.scale"]
 
 
+def moved_as(problem, theta):
+    """The problem of a joint that moved as the simulation does at some coordinates."""
+    pos = jnp.asarray(simulated(problem, theta[None])[0], jnp.float32)
+    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
+    return replace(problem, data=data, seen=Known())
+
+
 @pytest.fixture(scope="module")
 def unknown():
     """A servo without effort that is believed three times as stiff, and soft."""
@@ -66,9 +73,7 @@ def test_an_effect_that_shrinks_beside_what_took_its_place_is_tried(unknown):
     index = problem.space.of("backlash")[0]
     true = base.fit.theta.copy()
     true[index] = 0.15
-    pos = jnp.asarray(simulated(problem, true[None])[0], jnp.float32)
-    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
-    problem = replace(problem, data=data, seen=Known())
+    problem = moved_as(problem, true)
     (base,) = fit_models(problem, [()], [base.fit.theta])
     names = ["encoder_offset", "payload_mass", "mount_tilt", "armature", "backlash"]
     sets = [(name,) for name in names if name in problem.space.effects]
@@ -87,9 +92,7 @@ def test_an_effect_of_a_twentieth_of_its_start_is_tried(unknown, name):
     problem, base = settled_output(*unknown)
     index, true = problem.space.of(name)[0], base.fit.theta.copy()
     true[index] = problem.space.slots[index].starts[0] / 20.0
-    pos = jnp.asarray(simulated(problem, true[None])[0], jnp.float32)
-    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
-    problem = replace(problem, data=data, seen=Known())
+    problem = moved_as(problem, true)
     (base,) = fit_models(problem, [()], [base.fit.theta])
     sets = [(other,) for other in ("encoder_offset", "payload_mass", "armature", name)]
     proposed = fit_models(problem, sets, [base.fit.theta] * len(sets), rounds=0)
@@ -106,9 +109,7 @@ def test_a_limit_begins_in_the_direction_in_which_it_acts(unknown):
     up, down = problem.space.of("directional_slew")
     true, said = base.fit.theta.copy(), base.fit.theta.copy()
     true[up] = said[down] = 1.0  # the speed that two of a hundred samples exceed
-    pos = jnp.asarray(simulated(problem, true[None])[0], jnp.float32)
-    data = replace(problem.data, track=replace(problem.data.track, pos=pos))
-    problem = replace(problem, data=data, seen=Known())
+    problem = moved_as(problem, true)
     (base,) = fit_models(problem, [()], [base.fit.theta], rounds=0)
     proposed = fit_models(problem, [("directional_slew",)], [said], rounds=0)
     (_, near), *_ = output_starts(problem, base, proposed)
