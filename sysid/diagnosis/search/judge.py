@@ -17,9 +17,9 @@ error must fall by the share `LEAST_FALL`, or from clearly more than noise to ab
 that. Gains of a servo that nobody knows are, with and without the effect, those that
 the logged effort shows to that model, as surely as it does: free ones would do in the
 simulation what the effect does. The likelihood need not gain where
-repeats show that the logged effort has no other explanation: what parameters a little
-out of their tolerances hide of the angle, as a servo's damping hides friction, they do
-not hide of the effort, whose error then must fall by `LEAST_FALL_OF_EFFORT`. An angle
+the logged effort has no other explanation: what parameters a little out of their
+tolerances hide of the angle, as a servo's damping hides friction, they do not hide of
+the effort, whose error then must fall by `LEAST_FALL_OF_EFFORT`. An angle
 that does not show the cause need not come nearer by `LEVEL` either, which chance would
 decide: it must come nearer at all. Where the angle does show it, and `t` is for it, an
 effort that falls so far is enough to matter, too, whatever is left of it.

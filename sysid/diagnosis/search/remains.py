@@ -48,13 +48,13 @@ def becomes_noise(before: float, after: float) -> bool:
 def explains_effort(before: float, after: float, repeats: bool) -> bool:
     """Whether of the error of a logged effort little more than noise is left.
 
-    Without repeats what is noise is not known, and next to nothing must be left.
+    Without repeats its noise is only what neighbouring samples do not share: where more
+    than that is left, it must be next to nothing.
 
     Args:
         before: mean squared error without a cause, in units of its noise [1].
         after: the same with it [1].
         repeats: whether motions repeat.
     """
-    if repeats:
-        return becomes_noise(before, after)
-    return bool(before > LEFT and after < LITTLE * before)
+    next_to_nothing = not repeats and before > LEFT and after < LITTLE * before
+    return bool(becomes_noise(before, after) or next_to_nothing)

@@ -35,6 +35,13 @@ of the size that a secant says, if the nuisance parameters follow."""
 NEARER = 1e-6
 """Share of the smaller model's error by which a start of a secant's size is nearer."""
 
+GAPS = ("deadband", "backlash")
+"""Effects of a gap that is crossed freely: hills of the error lie between its sizes."""
+
+MUCH = 2.0
+"""Mean squared error of the smaller model, in units of its noise, that is worth a fit
+from every size of a gap."""
+
 
 def output_starts(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
@@ -51,7 +58,9 @@ def output_starts(
     not. But there the gains' own tolerances may matter more than any effect, so those
     begin too that come nearest where it alone is put back. And those begin that come
     nearest if the nuisance parameters follow: alone beside those that have taken up a
-    part of it, as gains take up play, an effect shrinks to nothing.
+    part of it, as gains take up play, an effect shrinks to nothing. Beside
+    gains that stand for a gap, that of no size may be nearest: where much is left, it
+    begins at every size.
 
     Args:
         problem: the error of the angle.
@@ -73,7 +82,22 @@ def output_starts(
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
     starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
     starts += _followed(problem, smaller, proposed)
+    starts += _of_every_size(problem, smaller, proposed)
     return starts + _with_others_back(problem, smaller, proposed)
+
+
+def _of_every_size(
+    problem: OutputProblem, smaller: Model, proposed: list[Model]
+) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
+    """Returns gaps of every size beside the smaller model, where that leaves much."""
+    if smaller.errors.max() <= MUCH:
+        return []
+    return [
+        (m.effects, theta)
+        for m in proposed
+        if m.effects[-1] in GAPS
+        for theta in tried(problem, smaller, smaller.fit.theta, m.effects[-1])
+    ]
 
 
 def _followed(

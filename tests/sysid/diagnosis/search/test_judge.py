@@ -167,7 +167,24 @@ def test_an_angle_that_does_not_show_it_need_only_come_nearer_at_all():
     assert not says(Said(ENOUGH, 0.1 * LEVEL), before=1.8, after=1.0)
 
 
-def test_without_repeats_next_to_nothing_must_remain():
+@pytest.mark.parametrize(
+    ("t", "before", "after", "counts"),
+    [
+        (0.55, 14.1, 0.92, True),
+        (-0.55, 14.1, 0.92, False),
+        (0.55, 1.44, 0.92, False),
+        (0.55, 14.1, 3.7, False),
+    ],
+)
+def test_without_repeats_an_effort_that_becomes_noise_is_explained(
+    t, before, after, counts
+):
+    """Viscous friction, which the angle does not show; 1.44 without any effect."""
+    judge = Said(-0.7, t * LEVEL, repeat=False, fall=0.0)
+    assert says(judge, before, after) is counts
+
+
+def test_without_repeats_next_to_nothing_of_more_than_noise_must_remain():
     """A torque limit: 17,495 times what neighbours do not share becomes 50."""
     assert says(Said(1.4, 7.4, repeat=False), before=17_495.0, after=50.0)
     assert not says(Said(1.4, 7.4, repeat=False), before=1_000.0, after=40.0)

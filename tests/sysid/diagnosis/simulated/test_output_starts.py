@@ -15,6 +15,7 @@ from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import (
     ALONE_TRIED,
     EQUATIONS_TRIED,
+    MUCH,
     output_starts,
 )
 from sysid.diagnosis.simulated.settled_output import settled_output
@@ -84,6 +85,24 @@ def test_an_effect_that_shrinks_beside_what_took_its_place_is_tried(unknown):
         if e[0] == "backlash"
     ]
     assert 0.15 in begun
+
+
+@pytest.mark.parametrize("left", [1.0, 20.0])
+def test_where_much_is_left_a_gap_begins_at_every_size(unknown, left):
+    """A gap that is crossed freely: gains take up a part, and beside those it is far.
+
+    Of what is all but noise the nearest size is enough.
+    """
+    problem, base = settled_output(*unknown)
+    base = replace(base, errors=np.array([0.0, left]))
+    names = ["encoder_offset", "payload_mass", "armature", "mount_tilt", "backlash"]
+    sets = [(name,) for name in names if name in problem.space.effects]
+    proposed = fit_models(problem, sets, [base.fit.theta] * len(sets), rounds=0)
+    starts = output_starts(problem, base, proposed)
+    index = problem.space.of("backlash")[0]
+    begun = {float(t[index]) for e, t in starts if e == ("backlash",)}
+    every = set(problem.space.slots[index].starts)
+    assert (every <= begun) == (left > MUCH)
 
 
 @pytest.mark.parametrize("name", ["load_friction", "deadband"])
