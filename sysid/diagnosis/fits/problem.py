@@ -53,6 +53,8 @@ class Problem:
         known: which part of the joint can be examined; see `JointDrive`.
         block_s: length of stretches that are held out [s].
         whole: whether folds are settings or loads instead, which are not divided.
+        inflated: square of the noise over that which was measured, of both residuals:
+            more than one where what a model left counts as noise [1].
     """
 
     channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
@@ -68,6 +70,7 @@ class Problem:
     known: str = "both"
     block_s: float = BLOCK_S
     whole: bool = False
+    inflated: tuple[float, float] = (1.0, 1.0)
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -212,12 +215,13 @@ class Problem:
         Source:
             Ours: without repeats errors that no effect removes pass for noise.
         """
-        noise = []
+        noise, more = [], []
         for r, valid, known in zip(raw, self.valid, self.noise, strict=True):
             left = np.mean(r[valid] ** 2) if valid.any() else 0.0
             size = float(np.sqrt(correlation_time(r, valid) * left))
             noise.append(Noise(np.zeros(0), max(size, known.deviation)))
-        return replace(self, noise=tuple(noise))
+            more.append((noise[-1].deviation / known.deviation) ** 2)
+        return replace(self, noise=tuple(noise), inflated=(more[0], more[1]))
 
     def _noise(self, k: int, series: Float[np.ndarray, "m p"]) -> Noise:
         """Noise of one residual."""

@@ -285,8 +285,13 @@ class Judge:
         return gain > NOMINAL_THRESHOLD
 
     def _explains(self, smaller: Model, larger: Model) -> bool:
-        """Whether only the larger model leaves little more than noise in the effort."""
-        if not self.problem.data.effort.any():
+        """Whether only the larger model leaves little more than noise in the effort.
+
+        By the noise that was measured: what a first answer left is no measure of it.
+        """
+        problem = self.problem
+        if isinstance(problem, OutputProblem) or not problem.data.effort.all():
             return False
-        before, after = smaller.errors.max(), larger.errors.max()
-        return explains_effort(before, after, bool(self.problem.repeat))
+        models = smaller, larger
+        before, after = (float(np.max(m.errors * problem.inflated)) for m in models)
+        return explains_effort(before, after, bool(problem.repeat))

@@ -11,8 +11,8 @@ equation is right to half of its trace. Of a friction that falls with speed 0.17
 about its reversals, of a slack cable behind shifted loads 0.15 to 0.9."""
 
 LITTLE = 0.01
-"""Share of a squared error below which next to nothing of it is left; friction that
-cancels four fifths of a torque leaves 0.04."""
+"""Share of a squared error below which next to nothing of it is left, although that is
+more than noise; friction that cancels four fifths of a torque leaves 0.04."""
 
 
 def leaves_much(before: float, after: float, noise: float = LEFT) -> bool:

@@ -26,6 +26,7 @@ class Said(Judge):
         data = SimpleNamespace(valid=np.ones((4, 1), bool), effort=np.array([effort]))
         space = SimpleNamespace(of=lambda effect: [])
         problem = SimpleNamespace(data=data, known="both", repeat=repeat, space=space)
+        problem.inflated = (1.0, 1.0)
         super().__init__(problem, None)
         self.gain, self.t, self.share = gain, t, fall
         self.output = SimpleNamespace(samples=4)
@@ -152,11 +153,21 @@ def test_an_effort_that_falls_far_matters_where_the_angle_shows_the_cause(
     assert says(Said(gain, t, fall=0.11), 1.9, after) is counts
 
 
-def test_of_an_angle_alone_the_error_that_was_fitted_is_no_such_effort():
-    judge = Said(ENOUGH, 2.0 * LEVEL, fall=0.11)
-    judge.output = judge.problem
-    judge.problem.samples = 4
-    assert not says(judge, 1.9, 1.0)
+def test_of_an_angle_alone_the_error_that_was_fitted_is_no_such_effort(monkeypatch):
+    """Although an effort was logged: where the angle itself is searched."""
+    monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
+    for gain, before, after in ((ENOUGH, 1.9, 1.0), (-0.7, 14.1, 0.92)):
+        judge = Said(gain, 2.0 * LEVEL, fall=0.11)
+        judge.output = judge.problem
+        judge.problem.samples = 4
+        assert not says(judge, before, after)
+
+
+def test_an_effort_that_some_records_lack_is_no_proof():
+    judge = Said(-0.7, 2.0 * LEVEL, fall=0.0)
+    assert says(judge, 14.1, 0.92)
+    judge.problem.data.effort = np.array([True, False])
+    assert not says(judge, 14.1, 0.92)
 
 
 def test_an_angle_that_does_not_show_it_need_only_come_nearer_at_all():
@@ -174,6 +185,7 @@ def test_an_angle_that_does_not_show_it_need_only_come_nearer_at_all():
         (-0.55, 14.1, 0.92, False),
         (0.55, 1.44, 0.92, False),
         (0.55, 14.1, 3.7, False),
+        (0.55, 2.5, 1.9, False),
     ],
 )
 def test_without_repeats_an_effort_that_becomes_noise_is_explained(
@@ -182,6 +194,14 @@ def test_without_repeats_an_effort_that_becomes_noise_is_explained(
     """Viscous friction, which the angle does not show; 1.44 without any effect."""
     judge = Said(-0.7, t * LEVEL, repeat=False, fall=0.0)
     assert says(judge, before, after) is counts
+
+
+@pytest.mark.parametrize(("inflated", "counts"), [(1.5, True), (10.0, False)])
+def test_what_a_first_answer_left_is_no_measure_of_an_effort(inflated, counts):
+    """In units of a noise ten times too large, five times the noise looks like half."""
+    judge = Said(-0.7, 2.0 * LEVEL, repeat=False, fall=0.0)
+    judge.problem.inflated = (1.0, inflated)
+    assert says(judge, before=10.0, after=0.5) is counts
 
 
 def test_without_repeats_next_to_nothing_of_more_than_noise_must_remain():
@@ -202,7 +222,7 @@ def test_without_repeats_next_to_nothing_of_more_than_noise_must_remain():
     ],
 )
 def test_it_does_not_count_otherwise(changed):
-    """The angle comes (next to) no nearer, noise is not known, or much remains."""
+    """The angle comes (next to) no nearer, there is no effort, or much remains."""
     left = {"before": 381.0, "after": 0.5, **changed}
     sizes = {k: left.pop(k) for k in ("before", "after")}
     assert not says(Said(**{"gain": 1.4, "t": 7.4, **left}), **sizes)
