@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from sysid.diagnosis.fits.alone import costs, fitted_alone
-from sysid.diagnosis.fits.candidate import Model
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
 from sysid.diagnosis.fits.origins import at_nominal, put_back, with_effects
 from sysid.diagnosis.fits.projected import linear_costs
 from sysid.diagnosis.fits.secants import along_secants
@@ -23,6 +23,7 @@ from sysid.diagnosis.fits.starts import (
     tried,
 )
 from sysid.diagnosis.simulated.output_error import OutputProblem
+from sysid.diagnosis.simulated.play import NAME as PLAY
 
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""
@@ -35,12 +36,9 @@ of the size that a secant says, if the nuisance parameters follow."""
 NEARER = 1e-6
 """Share of the smaller model's error by which a start of a secant's size is nearer."""
 
-GAPS = ("deadband", "backlash")
-"""Effects of a gap that is crossed freely: hills of the error lie between its sizes."""
-
 MUCH = 2.0
-"""Mean squared error of the smaller model, in units of its noise, that is worth a fit
-from every size of a gap."""
+"""Mean squared error of the smaller model, in units of its noise, that is worth fits of
+a play from every size."""
 
 
 def output_starts(
@@ -58,9 +56,9 @@ def output_starts(
     not. But there the gains' own tolerances may matter more than any effect, so those
     begin too that come nearest where it alone is put back. And those begin that come
     nearest if the nuisance parameters follow: alone beside those that have taken up a
-    part of it, as gains take up play, an effect shrinks to nothing. Beside
-    gains that stand for a gap, that of no size may be nearest: where much is left, it
-    begins at every size.
+    part of it, as gains take up play, an effect shrinks to nothing. A joint crosses a
+    large play freely: hills lie between its sizes, and beside gains that stand for it
+    the nearest size may be none, so where much is left it is fitted from each.
 
     Args:
         problem: the error of the angle.
@@ -89,15 +87,13 @@ def output_starts(
 def _of_every_size(
     problem: OutputProblem, smaller: Model, proposed: list[Model]
 ) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
-    """Returns gaps of every size beside the smaller model, where that leaves much."""
-    if smaller.errors.max() <= MUCH:
+    """Returns the nearest play fitted beside the smaller model, if much is left."""
+    sets = [m.effects for m in proposed if m.effects[-1] == PLAY]
+    if not sets or smaller.errors.max() <= MUCH:
         return []
-    return [
-        (m.effects, theta)
-        for m in proposed
-        if m.effects[-1] in GAPS
-        for theta in tried(problem, smaller, smaller.fit.theta, m.effects[-1])
-    ]
+    begin = tried(problem, smaller, smaller.fit.theta, PLAY)
+    fits = fit_models(problem, sets * len(begin), begin, rounds=CONVERGED)
+    return [(sets[0], min(fits, key=lambda m: m.fit.cost).fit.theta)]
 
 
 def _followed(
