@@ -27,8 +27,13 @@ COSTLY = (
 
 MOST = 2
 """Number of sets of costly effects that have programs of their own in one call; more
-of them share that of all."""
+of them share that of all, or of all but those that are `APART`."""
 
+
+APART = ("compliance",)
+"""Effects that act on others by being there, at any size: beside a spring a play has a
+motor without inertia (`simulated/play.py`). Only those share its program that have
+it."""
 
 Program = tuple[str, ...]
 """What is compiled: the effects that it simulates, in the order of the chain."""
@@ -46,7 +51,8 @@ def programs(
     acting = np.stack([_acts(space, thetas, name) for name in COSTLY], 1)
     kinds = np.unique(acting, axis=0)
     if np.count_nonzero(kinds.any(1)) > MOST:
-        acting |= acting.any(1, keepdims=True)
+        shared = [name not in APART for name in COSTLY]
+        acting[:, shared] |= acting.any(1, keepdims=True)
         kinds = np.unique(acting, axis=0)
     chain = [e for e in space.effects if e in KINDS]
     for kind in kinds:

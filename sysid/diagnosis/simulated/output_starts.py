@@ -93,7 +93,10 @@ def _of_every_size(
         return []
     begin = tried(problem, smaller, smaller.fit.theta, PLAY)
     fits = fit_models(problem, sets * len(begin), begin, rounds=CONVERGED)
-    return [(sets[0], min(fits, key=lambda m: m.fit.cost).fit.theta)]
+    # On its way through a narrow valley, rounding is enough to lead out of it.
+    nearest = min(fits, key=lambda m: m.fit.cost).fit.theta
+    (ended,) = fit_models(problem, sets, [nearest], rounds=CONVERGED)
+    return [(sets[0], ended.fit.theta)]
 
 
 def _followed(

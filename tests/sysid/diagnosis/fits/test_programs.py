@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
-from sysid.diagnosis.fits.programs import COSTLY, programs
+from sysid.diagnosis.fits.programs import APART, COSTLY, programs
 from sysid.diagnosis.simulated.closed_loop import simulated
 
 
@@ -32,21 +32,25 @@ def test_every_candidate_has_one_program_with_its_effects():
         assert "slew_limit" not in program  # of the targets, in front of it
 
 
-def test_many_kinds_share_the_program_of_all():
+def test_many_kinds_share_a_program_but_for_a_spring():
     problem = problem_with()
     there = [e for e in COSTLY if problem.space.of(e)]
-    found = list(
-        programs(problem.space, candidates(problem, (), *((e,) for e in there)))
-    )
-    assert len(there) > 2
-    assert [len(who) for _, who in found] == [1, len(there)]
-    assert set(there) <= set(found[1][0])
+    sets = [(), *((e,) for e in there)]
+    found = list(programs(problem.space, candidates(problem, *sets)))
+    assert len(there) > 3 and APART == ("compliance",)
+    assert [len(who) for _, who in found] == [1, len(there) - 1, 1]
+    shared = set(there) - set(APART)
+    assert [shared <= set(program) for program, _ in found] == [False, True, True]
+    assert ["compliance" in program for program, _ in found] == [False, False, True]
+    assert found[2][1].tolist() == [1 + there.index("compliance")]
 
 
-def test_company_changes_no_angle():
+@pytest.mark.parametrize("more", [(), ("compliance", "payload_com", "hysteresis")])
+def test_company_changes_no_angle(more):
+    """Of a play least: beside a spring its motor has no inertia."""
     problem = problem_with(row_s=0.004)
     sets = [(), ("backlash",), ("thermal_derating",), ("slew_limit",), ("armature",)]
-    rows = candidates(problem, *sets)
+    rows = candidates(problem, *sets, *((name,) for name in more))
     together = simulated(problem, rows)
     alone = np.concatenate([simulated(problem, row[None]) for row in rows])
     assert together == pytest.approx(alone, abs=2e-6)
