@@ -1,5 +1,6 @@
 """The page about the paper's claims says what was measured, by its rule."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,10 @@ from support.synthetic_sweep import write_sweep
 from benchmarks.claims import claims_page
 from benchmarks.claims.claims import (
     CLAIMS,
+    MORE_CLAIMS,
     SEEDS,
+    SPEED,
+    TUNED,
     WALK,
     gaps,
     measured,
@@ -18,20 +22,26 @@ from benchmarks.claims.claims import (
     verdict,
     walkers,
 )
-from benchmarks.claims.claims_page import (
+from benchmarks.claims.claims_page import DIGEST, FIGURE, MEASURES, PAGE, digest
+from benchmarks.claims.sweeps import (
     ABLATION,
-    DIGEST,
-    FIGURE,
-    MEASURES,
-    PAGE,
-    digest,
-    page,
+    TEST,
+    TUNED_STOCK,
+    WEIGHTS,
+    chosen,
+    joined,
+    read,
 )
-from fingers_mjx.studies.comparison.results import Results, read_results
+from fingers_mjx.studies.comparison.results import Missing, Results, read_results
 from fingers_mjx.studies.sweep.manifest import read_manifest
 
 FASTER, ALIKE = CLAIMS[0], next(c for c in CLAIMS if c.paper is None)
 NOISE = 0.004 * np.cos(2.4 * np.arange(SEEDS))
+NONE = Results("crawl", (), {}, {}, (), {})
+
+
+def page(results, stock=NONE, weights=NONE):
+    return claims_page.page(results, stock, weights)
 
 
 def made(gain, claim=FASTER, seeds=SEEDS, speed=0.08) -> Results:
@@ -72,11 +82,72 @@ def row_of(text):
 
 
 def test_the_page_is_what_the_results_say():
-    results = read_results(ABLATION, read_manifest(ABLATION))
-    assert PAGE.read_text("utf-8") == page(results)
-    speeds: Any = results.values["ours"]["task_speed_mps"]
-    speeds[0] += 0.01
-    assert PAGE.read_text("utf-8") != page(results)
+    sweeps = tuple(map(read, (ABLATION, TUNED_STOCK, WEIGHTS)))
+    assert PAGE.read_text("utf-8") == page(*sweeps)
+    names = "ours", chosen(sweeps[1]) or "", "lift_2"
+    for results, name in zip(sweeps, names, strict=True):
+        speeds: Any = results.values[name][SPEED]
+        speeds[1] += 0.01
+        assert PAGE.read_text("utf-8") != page(*sweeps)
+        speeds[1] -= 0.01
+
+
+def stock(fastest="b", lacks=()):
+    """Results of a test of two settings, one of them faster on its seeds alone."""
+    values: Any = {
+        name: {SPEED: {s: 0.01 + 0.01 * (name == fastest) for s in (*TEST, 8)}}
+        for name in ("a", "b")
+    }
+    values["a"][SPEED] |= dict.fromkeys((0, 1), 0.5)  # by which they were chosen
+    values["c"] = {SPEED: {0: 0.9}}  # not in the test
+    for name, seed in lacks:
+        del values[name][SPEED][seed]
+    missing = tuple(Missing(name, seed, "", "failed") for name, seed in lacks)
+    return Results("crawl", tuple(values), values, {}, missing, {})
+
+
+def test_tuned_stock_is_what_is_fastest_on_the_seeds_of_its_test():
+    assert chosen(stock("a")) == "a" and chosen(stock("b")) == "b"
+    assert chosen(stock("b", [("a", TEST[0])])) is None
+    assert chosen(NONE) is None
+
+
+def test_the_chosen_setting_is_compared_as_tuned_stock():
+    every = joined(made(0.01), stock("b", [("b", 8)]), NONE)
+    assert every.values[TUNED][SPEED] == dict.fromkeys(TEST, 0.02)
+    assert [(m.configuration, m.seed) for m in every.missing] == [(TUNED, 8)]
+    claim = MORE_CLAIMS[0]
+    assert measured(claim, every).n == len(TEST)
+    lost = [(gap.configuration, gap.seed) for gap in gaps(claim, every) if gap.lost]
+    assert lost == [(TUNED, 8)]
+
+
+def test_sweeps_that_were_evaluated_in_other_ways_are_not_compared():
+    other = Results("crawl", (), {}, {}, (), {"seed": 1})
+    ours = replace(made(0.01), conditions={"seed": 0})
+    assert joined(ours, NONE, replace(other, conditions={"seed": 0}))
+    with pytest.raises(ValueError, match="different ways"):
+        joined(ours, NONE, other)
+
+
+@pytest.mark.parametrize(("behind", "answer"), [(0, "agrees"), (1, "disagrees: in 11")])
+def test_what_is_said_of_every_seed_holds_for_every_seed(behind, answer):
+    claim = next(c for c in MORE_CLAIMS if c.every)
+    results = made(0.05, claim)
+    ours: Any = results.values[claim.ours]
+    ours[SPEED] = dict.fromkeys(range(SEEDS), 0.08)
+    ours[claim.measure] |= {i: -1.0 for i in range(behind)}
+    assert judged(results, claim).startswith(answer)
+
+
+def test_six_seeds_are_enough_where_the_paper_had_six():
+    claim = next(c for c in MORE_CLAIMS if c.seeds == 6)
+    results = made(0.05, claim, seeds=6)
+    values: Any = results.values
+    values["ours"] = {SPEED: dict.fromkeys(range(SEEDS), 0.08)}
+    assert judged(results, claim) == "agrees"
+    del values[claim.other][claim.measure][5]
+    assert judged(results, claim) == "not yet: 5 of 6 seeds"
 
 
 def test_the_readme_quotes_the_page():
@@ -196,7 +267,7 @@ def test_seeds_beyond_the_specification_count_nowhere(tmp_path):
 
 
 def test_the_picture_is_of_the_results():
-    results = read_results(ABLATION, read_manifest(ABLATION))
+    results = read(ABLATION)
     assert stamp(FIGURE) == digest(results)
     speeds: Any = results.values["ours"]["task_speed_mps"]
     speeds[0] += 1e-9
