@@ -138,3 +138,23 @@ def test_a_notebook_alone_asks_for_an_address(monkeypatch, tmp_path, notebook):
         "fingers-deploy @ git+https://a/b#subdirectory=deploy",
         "fingers-mjx[viz] @ git+https://a/b",
     ]
+
+
+def test_what_is_locked_for_every_python_fits_its_jax():
+    """Flax before 0.12.12 asks JAX for what 0.11 no longer has, without saying so."""
+    packages = tomllib.loads((ROOT / "uv.lock").read_text("utf-8"))["package"]
+    locked = {
+        (package["version"], needed.get("version"))
+        for package in packages
+        if package["name"] == "flax"
+        for needed in package["dependencies"]
+        if needed["name"] == "jax"
+    }
+    newer = [flax for flax, jax in locked if version(jax) >= (0, 11)]
+    assert newer and len(locked) > len(newer)  # Python 3.12, and 3.11
+    assert all(version(flax) >= (0, 12, 12) for flax in newer)
+
+
+def version(text):
+    """Its numbers."""
+    return tuple(map(int, text.split(".")))

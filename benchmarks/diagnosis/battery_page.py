@@ -18,7 +18,7 @@ from benchmarks.diagnosis.score import Row, confusion, read_rows, statistics
 from envs.config.atomic_file import write_atomic
 from sysid.diagnosis.verdict.posterior import CALIBRATION
 
-SEED, PLANNED, COMMIT = 9631688, 700, "0fd75da"
+SEED, PLANNED, COMMIT = 1967351, 700, "57a2bc9"
 ROWS = Path(f"benchmarks/results/battery-wide-{SEED}.jsonl")
 PAGE = Path("docs/results/battery.md")
 FIGURE = Path("docs/images/reliability.png")
