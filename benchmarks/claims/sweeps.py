@@ -32,8 +32,8 @@ def tested(stock: Results) -> dict[str, dict[int, float]]:
     Args:
         stock: results of the sweep of tuned stock.
     """
-    speeds = {name: stock.values[name][SPEED] for name in stock.values}
-    return {n: dict(of) for n, of in speeds.items() if any(s in TEST for s in of)}
+    speeds = {name: dict(of[SPEED]) for name, of in stock.values.items()}
+    return {name: of for name, of in speeds.items() if any(s in TEST for s in of)}
 
 
 def chosen(stock: Results) -> str | None:

@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 from support.synthetic_sweep import write_sweep
 
-from benchmarks.claims import claims_page
+from benchmarks.claims import claims_page, sweeps
 from benchmarks.claims.claims import (
     CLAIMS,
     MORE_CLAIMS,
@@ -25,6 +25,7 @@ from benchmarks.claims.claims import (
 from benchmarks.claims.claims_page import DIGEST, FIGURE, MEASURES, PAGE, digest
 from benchmarks.claims.sweeps import (
     ABLATION,
+    CHOSE,
     TEST,
     TUNED_STOCK,
     WEIGHTS,
@@ -32,8 +33,11 @@ from benchmarks.claims.sweeps import (
     joined,
     read,
 )
+from envs.config.typed import load_yaml
 from fingers_mjx.studies.comparison.results import Missing, Results, read_results
 from fingers_mjx.studies.sweep.manifest import read_manifest
+from fingers_mjx.studies.sweep.promote import choosing
+from fingers_mjx.studies.sweep.spec import Sweep, seed_list
 
 FASTER, ALIKE = CLAIMS[0], next(c for c in CLAIMS if c.paper is None)
 NOISE = 0.004 * np.cos(2.4 * np.arange(SEEDS))
@@ -82,13 +86,13 @@ def row_of(text):
 
 
 def test_the_page_is_what_the_results_say():
-    sweeps = tuple(map(read, (ABLATION, TUNED_STOCK, WEIGHTS)))
-    assert PAGE.read_text("utf-8") == page(*sweeps)
-    names = "ours", chosen(sweeps[1]) or "", "lift_2"
-    for results, name in zip(sweeps, names, strict=True):
+    read_all = tuple(map(read, (ABLATION, TUNED_STOCK, WEIGHTS)))
+    assert PAGE.read_text("utf-8") == page(*read_all)
+    names = "ours", chosen(read_all[1]) or "", "lift_2"
+    for results, name in zip(read_all, names, strict=True):
         speeds: Any = results.values[name][SPEED]
         speeds[1] += 0.01
-        assert PAGE.read_text("utf-8") != page(*sweeps)
+        assert PAGE.read_text("utf-8") != page(*read_all)
         speeds[1] -= 0.01
 
 
@@ -104,6 +108,15 @@ def stock(fastest="b", lacks=()):
         del values[name][SPEED][seed]
     missing = tuple(Missing(name, seed, "", "failed") for name, seed in lacks)
     return Results("crawl", tuple(values), values, {}, missing, {})
+
+
+def test_the_seeds_of_tuned_stock_are_those_of_its_specification():
+    spec = load_yaml(Sweep, TUNED_STOCK / "spec.yaml")
+    in_test = sweeps.tested(read(TUNED_STOCK))
+    chose = choosing(spec, read_manifest(TUNED_STOCK))
+    assert spec.promote is not None and len(in_test) == spec.promote.top
+    assert chose == dict.fromkeys(in_test, CHOSE)
+    assert seed_list(spec.promote.seeds, max(CHOSE)) == tuple(TEST)
 
 
 def test_tuned_stock_is_what_is_fastest_on_the_seeds_of_its_test():

@@ -153,14 +153,21 @@ def test_an_effort_that_falls_far_matters_where_the_angle_shows_the_cause(
     assert says(Said(gain, t, fall=0.11), 1.9, after) is counts
 
 
-def test_of_an_angle_alone_the_error_that_was_fitted_is_no_such_effort(monkeypatch):
-    """Although an effort was logged: where the angle itself is searched."""
+def test_of_an_angle_alone_the_error_that_was_fitted_is_no_such_effort():
+    judge = Said(ENOUGH, 2.0 * LEVEL, fall=0.11)
+    judge.output = judge.problem
+    judge.problem.samples = 4
+    assert not says(judge, 1.9, 1.0)
+
+
+def test_where_the_angle_is_searched_its_error_explains_no_effort(monkeypatch):
+    """Although an effort was logged; else such a fall of its error would be enough."""
+    judge = Said(-0.7, 2.0 * LEVEL, fall=0.11)
+    judge.output = judge.problem
+    judge.problem.samples = 4
+    assert says(judge, 14.1, 0.92)
     monkeypatch.setattr(module, "OutputProblem", SimpleNamespace)
-    for gain, before, after in ((ENOUGH, 1.9, 1.0), (-0.7, 14.1, 0.92)):
-        judge = Said(gain, 2.0 * LEVEL, fall=0.11)
-        judge.output = judge.problem
-        judge.problem.samples = 4
-        assert not says(judge, before, after)
+    assert not says(judge, 14.1, 0.92)
 
 
 def test_an_effort_that_some_records_lack_is_no_proof():
