@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import pytest
 from support.house import ROOT
@@ -181,14 +182,16 @@ def test_a_sweep_is_looked_at_without_jax(argv, most, tmp_path, monkeypatch):
 
 def make_policies(path):
     """Makes runs with and without a checkpoint, and a bundle that was changed."""
-    setup = load_setup(CRAWL_POLICY / "config.yaml", DEFAULT_HAND_FILE, "crawl")
-    shared = {"train": {"task": "crawl"}}
-    for name in ("run", "unsaved"):
+    for name, task in (("run", "crawl"), ("unsaved", "crawl"), ("keys", "keyboard")):
+        source = CRAWL_POLICY.with_name(task) / "config.yaml"
+        setup = load_setup(source, DEFAULT_HAND_FILE, task)
+        env = replace(setup.env, weights={}, schedule_scale={})
         with open_run(path / name, resume=False) as made:
-            settings = {"train": setup.train, "env": setup.env}
-            record_run(made, settings, shared, setup.hand)
-    (path / "run/checkpoints/00000001").mkdir(parents=True)
-    seal(path / "run/checkpoints/00000001", 1)
+            settings = {"train": setup.train, "env": env}
+            record_run(made, settings, {"train": {"task": task}}, setup.hand)
+    for name in ("run", "keys"):
+        (path / name / "checkpoints/00000001").mkdir(parents=True)
+        seal(path / name / "checkpoints/00000001", 1)
     shutil.copytree(CRAWL_POLICY, path / "changed")
     with (path / "changed/hand.yaml").open("a") as file:
         file.write("\n")
@@ -205,7 +208,7 @@ def make_policies(path):
         (["eval", f"{CRAWL_POLICY.with_name('recovery')}"], "falls: held_out"),
         (["play", "--viewer"], "task: crawl"),
         (["play", "run", "--friction", "0.25"], "tip_friction: [0.25, 0.25]"),
-        (["play", f"{CRAWL_POLICY.with_name('keyboard')}"], "height_m: 0.0"),
+        (["play", "keys"], "height_m: 0.0"),
     ],
 )
 def test_a_policys_settings_are_shown_without_jax(argv, shown, tmp_path, monkeypatch):
@@ -214,6 +217,14 @@ def test_a_policys_settings_are_shown_without_jax(argv, shown, tmp_path, monkeyp
     lines, status, said, loaded = printed(*argv, "--dry-run")
     assert (status, said) == (0, "") and set(loaded) <= {"numpy"}
     assert shown in map(str.strip, lines)
+
+
+def test_settings_that_name_rewards_need_their_tables_and_no_simulator():
+    policy = CRAWL_POLICY.with_name("keyboard")
+    lines, status, said, loaded = printed("play", f"{policy}", "--dry-run")
+    assert (status, said) == (0, "") and set(loaded) <= {"numpy", "jax", "flax"}
+    assert "height_m: 0.0" in map(str.strip, lines)
+    assert "weights: {slide: -30.0}" in map(str.strip, lines)
 
 
 @pytest.mark.parametrize("command", ["eval", "play"])
