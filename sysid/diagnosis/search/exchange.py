@@ -2,6 +2,7 @@
 
 from sysid.diagnosis.fits.candidate import Model, fit_models, likelihood_gap
 from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.search.contained import shows_more
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, deciding_gap, extended
@@ -55,6 +56,7 @@ def exchanged(
                 > max(NESTED_SHARE * gain, deciding_gap(problem, cause, m, gain))
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
+                and shows_more(judge, best, m)
             ]
             if better:
                 break

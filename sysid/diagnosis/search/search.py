@@ -19,6 +19,7 @@ from sysid.diagnosis.fits.candidate import (
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.by_angle import explained, nearest, unsolved
+from sysid.diagnosis.search.contained import plainest
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.decided import decided_by_angle
 from sysid.diagnosis.search.exchange import MOST, exchanged, pruned, swapped
@@ -232,6 +233,6 @@ def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | Non
     nearer = None
     for model in (m for m in order if judge.prefers(smaller, m)):
         if judge.confirms(smaller, model):
-            return model
+            return plainest(judge, smaller, model, better)
         nearer = nearer or model
     return nearer

@@ -1,6 +1,7 @@
 """Neighbours that pull, repeats under jitter, and what remains unexplained."""
 
 from dataclasses import replace
+from functools import partial
 from types import SimpleNamespace
 from typing import Any
 
@@ -213,28 +214,35 @@ def test_what_a_cycle_makes_of_an_angle_at_speed_is_no_jump(searched, times, jum
     assert _jumps(problem, weight[0] * error, 0) == jumps
 
 
-def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
-    """The first of two causes was chosen when it had to stand for both."""
-    problem = searched.problem
-    base = replace(searched.base, errors=np.array([4.0, 4.0]))
+def ahead(base, effects, gained):
+    """A model with these effects that gains so much [nat]."""
+    score = base.score - 2.0 * gained
+    fit = replace(base.fit, cost=base.fit.cost - 2.0 * gained)
+    errors = base.errors - gained / 200.0
+    return replace(base, effects=effects, score=score, fit=fit, errors=errors)
 
-    def scored(effects, gained):
-        score = base.score - 2.0 * gained
-        fit = replace(base.fit, cost=base.fit.cost - 2.0 * gained)
-        errors = base.errors - gained / 200.0
-        return replace(base, effects=effects, score=score, fit=fit, errors=errors)
 
-    first = scored(("payload_com", "deadband"), 300.0)
-    right = scored(("deadband", "joint_coupling"), 340.0)
-    alone = scored(("deadband",), 100.0)
-    without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
-    offered = {first.effects: {"payload_com": [right], "deadband": []}}
+def offer(monkeypatch, offered, without):
+    """Lets these models take the places of causes."""
     monkeypatch.setattr(
         exchange,
         "swapped",
         lambda problem, best, base: (offered.get(best.effects, {}), without),
     )
     monkeypatch.setattr(exchange, "pruned", lambda problem, model, base: model)
+
+
+def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
+    """The first of two causes was chosen when it had to stand for both."""
+    problem = searched.problem
+    base = replace(searched.base, errors=np.array([4.0, 4.0]))
+    scored = partial(ahead, base)
+    first = scored(("payload_com", "deadband"), 300.0)
+    right = scored(("deadband", "joint_coupling"), 340.0)
+    alone = scored(("deadband",), 100.0)
+    without = {"payload_com": alone, "joint_coupling": alone, "deadband": base}
+    offered = {first.effects: {"payload_com": [right], "deadband": []}}
+    offer(monkeypatch, offered, without)
     willing = SimpleNamespace(confirms=lambda smaller, larger: True)
     assert exchange.exchanged(problem, first, base, willing)[0] is right
     close = scored(right.effects, 302.0)
@@ -243,6 +251,26 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     without["deadband"] = scored(("payload_com",), 298.0)
     last = exchange.exchanged(problem, first, base, willing)[0]
     assert last is without["deadband"]
+
+
+def test_what_contains_a_cause_takes_its_place_if_the_angle_shows_it(
+    searched, monkeypatch
+):
+    """Beside another cause as well."""
+    problem = searched.problem
+    base = replace(searched.base, errors=np.array([4.0, 4.0]))
+    scored = partial(ahead, base)
+    dry = scored(("coulomb_friction", "deadband"), 300.0)
+    falls = scored(("deadband", "stribeck_friction"), 340.0)
+    without = dict.fromkeys((*dry.effects, *falls.effects), scored(("deadband",), 1.0))
+    without["deadband"] = base
+    offered = {dry.effects: {"coulomb_friction": [falls], "deadband": []}}
+    offer(monkeypatch, offered, without)
+    for shown, takes in ((False, dry), (True, falls)):
+        judge = SimpleNamespace(problem="equations", output="angle")
+        judge.confirms = lambda smaller, larger: True
+        judge.shows = lambda smaller, larger, shown=shown: shown
+        assert exchange.exchanged(problem, dry, base, judge)[0] is takes
 
 
 def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(searched):
