@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from sysid.diagnosis.fits.candidate import Model, likelihood_gap
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.by_angle import nearest
+from sysid.diagnosis.search.contained import plainer
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.selection import plausible, threshold_of
 from sysid.diagnosis.search.stage import NESTED, NESTED_SHARE, extended
@@ -55,8 +56,10 @@ def decided_by_angle(
     for m in sorted(asked, key=lambda m: -ahead[m.effects]):
         needed = threshold_of(judge.problem, m, m.effects)
         least = max(needed, NESTED_SHARE * gain)
-        if ahead[m.effects] > least and judge.confirms(base, m):
-            lead = ahead.pop(m.effects)
+        if ahead[m.effects] <= least or not judge.confirms(base, m):
+            continue
+        lead = ahead.pop(m.effects)
+        if plainer(judge, base, m, others) is None:
             leads = {e: lead - by for e, by in ahead.items()}
             leads |= {best.effects: lead, (): _by_angle(judge, base, m)}
             return Decided(m, leads)

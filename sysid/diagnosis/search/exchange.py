@@ -2,7 +2,7 @@
 
 from sysid.diagnosis.fits.candidate import Model, fit_models, likelihood_gap
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.search.contained import shows_more
+from sysid.diagnosis.search.contained import plainer, shows_more
 from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.stage import NESTED_SHARE, deciding_gap, extended
@@ -48,6 +48,10 @@ def exchanged(
             best = without[min(gaps, key=gaps.__getitem__)]
             continue
         for cause, stage in others.items():
+            plain = plainer(judge, without[cause], best, stage)
+            if plain and accepted(problem, without[cause], plain, base):
+                better = [plain]
+                break
             gain = likelihood_gap(without[cause], best, samples)
             better = [
                 m
@@ -57,6 +61,7 @@ def exchanged(
                 and accepted(problem, without[cause], m, base)
                 and judge.confirms(without[cause], m)
                 and shows_more(judge, best, m)
+                and not plainer(judge, without[cause], m, stage)
             ]
             if better:
                 break

@@ -252,7 +252,7 @@ class Judge:
         """
         worse, better = self.pair(smaller, larger)
         left = (larger.errors.max() / smaller.errors.max()) ** 0.5
-        shown = self._explains(smaller, larger)
+        shown = self.explains(smaller, larger)
         if self.output is not self.problem:  # the effort is apart from the angle
             shown = shown or self.shows(smaller, larger)
         if shown and 1.0 - left > LEAST_FALL_OF_EFFORT:
@@ -269,7 +269,7 @@ class Judge:
         """Whether the larger model predicts angles better than the smaller one."""
         if not self.sees:
             return True
-        explained = self._explains(smaller, larger)
+        explained = self.explains(smaller, larger)
         # Where the effort is the proof, the angle need only come nearer at all.
         least = 0.0 if explained else LEVEL
         needed = explained or self.shows(smaller, larger)
@@ -284,7 +284,7 @@ class Judge:
         gain = log_likelihood_gain(before, after, self.output.samples)
         return gain > NOMINAL_THRESHOLD
 
-    def _explains(self, smaller: Model, larger: Model) -> bool:
+    def explains(self, smaller: Model, larger: Model) -> bool:
         """Whether only the larger model leaves little more than noise in the effort.
 
         By the noise that was measured: what a first answer left is no measure of it.

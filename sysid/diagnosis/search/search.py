@@ -19,7 +19,7 @@ from sysid.diagnosis.fits.candidate import (
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.search.by_angle import explained, nearest, unsolved
-from sysid.diagnosis.search.contained import plainest
+from sysid.diagnosis.search.contained import plainer
 from sysid.diagnosis.search.coupling import coupled
 from sysid.diagnosis.search.decided import decided_by_angle
 from sysid.diagnosis.search.exchange import MOST, exchanged, pruned, swapped
@@ -29,6 +29,7 @@ from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.settling import refitted, settled
 from sysid.diagnosis.search.stage import (
     extended,
+    simplest_first,
     still_accepted,
 )
 from sysid.diagnosis.simulated.output_error import output_problem
@@ -233,6 +234,11 @@ def _confirmed(judge: Judge, smaller: Model, better: list[Model]) -> Model | Non
     nearer = None
     for model in (m for m in order if judge.prefers(smaller, m)):
         if judge.confirms(smaller, model):
-            return plainest(judge, smaller, model, better)
+            plain = plainer(judge, smaller, model, better)
+            if plain is None:
+                return model
+            rest = [m for m in better if m is not model]
+            rest = simplest_first(judge.problem, smaller, rest)
+            return _confirmed(judge, smaller, rest) or plain
         nearer = nearer or model
     return nearer

@@ -47,7 +47,7 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     near = models[:REFINED]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
     models = _best([*models, *fit_models(problem, sets, starts, rounds=CONVERGED)])
-    return _simplest_first(problem, model, _ordered(problem, model, models))
+    return simplest_first(problem, model, _ordered(problem, model, models))
 
 
 def _best(models: list[Model]) -> list[Model]:
@@ -78,7 +78,7 @@ def _extended(problem: Problem, model: Model) -> list[Model]:
     models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], shared)
     alone = _nearest_alone(problem, model, starts)
     stage = _refined(problem, model, _best(models), alone)
-    return _simplest_first(problem, model, stage)
+    return simplest_first(problem, model, stage)
 
 
 def _nearest_alone(
@@ -132,7 +132,7 @@ def still_accepted(
     starts = [with_effects(problem, origin, m, m.effects) for m in lost]
     again = fit_models(problem, sets, starts, rounds=CONVERGED)
     kept += [m for m in again if accepted(problem, smaller, m, base)]
-    return _simplest_first(problem, smaller, _ordered(problem, smaller, kept))
+    return simplest_first(problem, smaller, _ordered(problem, smaller, kept))
 
 
 def _refined(
@@ -172,9 +172,7 @@ def _ordered(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model
     return sorted(stage, key=lambda m: likelihood_gap(m, least, problem.samples))
 
 
-def _simplest_first(
-    problem: Problem, smaller: Model, stage: list[Model]
-) -> list[Model]:
+def simplest_first(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
     """Puts the effect with the fewest parameters first among those that tie."""
     stage = [m for m in stage if not repeats_friction(problem, m)]
     if not stage:

@@ -41,10 +41,11 @@ def _alternatives(found: Search, cause: str) -> list[Alternative]:
     gain = found.behind(without)
     for model in found.alternatives.get(cause, []):
         effect = next(e for e in model.effects if e not in found.best.effects)
+        if effect in NESTED.get(cause, ()):
+            continue
         gap = found.behind(model)
         least = NOMINAL_THRESHOLD if _alike(model, found.best) else DISTINCT
         distinct = gap > max(least, NESTED_SHARE * gain)
-        distinct = distinct or effect in NESTED.get(cause, ())
         # Chance alone gives some effects as much as a nominal value's small step.
         chance = gain - gap < THRESHOLD and not _confusable(effect, cause)
         if np.isfinite(gap) and gap < 0.9 * gain:

@@ -51,6 +51,15 @@ def test_an_absent_effect_wins_alone(changed, won):
     assert text.endswith(f"{int(won)} of 1 absent effects win")
 
 
+def test_dry_friction_does_not_fall_with_speed():
+    """By the equations it does; the angle does not say so."""
+    pairs = [(a, t) for a, t in absent_tasks() if a == "stribeck_friction"]
+    (row,) = [run_task(task) for _, task in pairs if task.conditions.effort]
+    assert (row.note, row.verdict, row.causes) == ("", "found", row.effects)
+    assert row.effects == ("coulomb_friction",)
+    assert row.evidence["servo"]["stribeck_friction"] > 0.0
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("absent", ["load_friction", "hysteresis", "torque_limit"])
 def test_what_is_not_there_is_not_named_alone(absent):

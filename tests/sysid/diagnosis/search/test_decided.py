@@ -124,3 +124,27 @@ def test_two_causes_stay(monkeypatch):
     both = model("payload_com", 17.0, 300.0)
     both.effects = ("payload_com", "deadband")
     assert decide(monkeypatch, both, [COUPLED]) is None
+
+
+@pytest.mark.parametrize(
+    ("shown", "takes", "behind"),
+    [("stribeck_friction", "stribeck_friction", 16.0), ("", "coulomb_friction", 13.0)],
+)
+def test_what_contains_another_takes_the_place_if_more_is_shown(
+    shown, takes, behind, monkeypatch
+):
+    """At the same angle it would be ahead by the error of the equations alone."""
+    judge: Any = Judge()
+    judge.shows = lambda smaller, larger: larger.effects == (shown,)
+    judge.explains = lambda smaller, larger: False
+    load = model("payload_com", 100.0, 100.0)
+    falls = model("stribeck_friction", 95.0, 301.0)
+    dry, viscous = (
+        model("coulomb_friction", 80.0, 300.0),
+        model("viscous_friction", 82.0, 285.0),
+    )
+    said = decide(monkeypatch, load, [falls, dry, viscous], judge)
+    assert said is not None and said.best.effects == (takes,)
+    assert said.leads.get(("stribeck_friction",), 0.0) >= 0.0
+    other = said.leads[("viscous_friction",)]
+    assert other == pytest.approx(behind + 13.0 if shown else behind)

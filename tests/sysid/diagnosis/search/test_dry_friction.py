@@ -14,7 +14,7 @@ from sysid.diagnosis.search.presliding import (
     repeats_friction,
     turning_travel,
 )
-from sysid.diagnosis.search.stage import _simplest_first, deciding_gap
+from sysid.diagnosis.search.stage import deciding_gap, simplest_first
 
 NOISE_RAD = 1e-3
 COULOMB = Slot("coulomb_friction", "torque_nm", "N·m", "linear", 1.0, 0.0, 0.0, 9.0,
@@ -58,7 +58,7 @@ def first(behind, range_rad, gain=1000.0):
     nothing = model((), 2.0 * gain)
     hysteresis = model(("hysteresis",), 0.0, range_rad)
     friction = model(("coulomb_friction",), 2.0 * behind)
-    return _simplest_first(PROBLEM, nothing, [hysteresis, friction])[0].effects[0]
+    return simplest_first(PROBLEM, nothing, [hysteresis, friction])[0].effects[0]
 
 
 @pytest.mark.parametrize(
@@ -105,6 +105,6 @@ def test_dry_friction_is_not_added_twice():
     assert repeats_friction(PROBLEM, twice)
     assert not repeats_friction(PROBLEM, model(twice.effects, 0.0, WIDE))
     backlash = model((*friction, "backlash"), 50.0)
-    found = _simplest_first(PROBLEM, model(friction, 100.0), [twice, backlash])
+    found = simplest_first(PROBLEM, model(friction, 100.0), [twice, backlash])
     assert found == [backlash]
-    assert _simplest_first(PROBLEM, model(friction, 100.0), [twice]) == []
+    assert simplest_first(PROBLEM, model(friction, 100.0), [twice]) == []

@@ -58,3 +58,13 @@ def test_where_the_angle_decided_alternatives_are_behind_by_it():
     near, far = (2.0, False), (300.0, True)
     assert said == {"stiffness": near, "armature": near, "payload_com": far}
     assert found.gain("joint_coupling") == 600.0
+
+
+def test_what_contains_a_cause_is_no_alternative_however_near():
+    """Ahead by the equations, and refused where the angle shows no more."""
+    best, base = model("coulomb_friction", 14.0), model("", 200.0, moved=50.0)
+    falls, other = model("stribeck_friction", 0.0), model("viscous_friction", 16.0)
+    judge = SimpleNamespace(prefers=lambda smaller, larger: True)
+    parts = ({best.effects[0]: [falls, other]}, {best.effects[0]: base}, [])
+    found = Search(None, base, best, *parts, SAMPLES, judge)
+    assert [a.effect for a in alternatives_of(found)] == ["viscous_friction"]

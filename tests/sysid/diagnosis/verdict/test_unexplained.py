@@ -253,24 +253,29 @@ def test_a_better_effect_takes_the_place_of_a_cause(searched, monkeypatch):
     assert last is without["deadband"]
 
 
-def test_what_contains_a_cause_takes_its_place_if_the_angle_shows_it(
-    searched, monkeypatch
-):
-    """Beside another cause as well."""
-    problem = searched.problem
-    base = replace(searched.base, errors=np.array([4.0, 4.0]))
-    scored = partial(ahead, base)
-    dry = scored(("coulomb_friction", "deadband"), 300.0)
+def test_what_contains_a_cause_takes_its_place_if_more_is_shown(searched, monkeypatch):
+    """Beside another cause as well, whichever of them came first."""
+    scored = partial(ahead, replace(searched.base, errors=np.array([4.0, 4.0])))
+    base = scored((), 0.0)
+    dry = scored(("deadband", "coulomb_friction"), 300.0)
     falls = scored(("deadband", "stribeck_friction"), 340.0)
-    without = dict.fromkeys((*dry.effects, *falls.effects), scored(("deadband",), 1.0))
-    without["deadband"] = base
-    offered = {dry.effects: {"coulomb_friction": [falls], "deadband": []}}
+    wrong = scored(("deadband", "payload_com"), 200.0)
+    names = ("payload_com", *dry.effects, *falls.effects)
+    without = dict.fromkeys(names, scored(("deadband",), 1.0)) | {"deadband": base}
+    stages = (wrong, [falls, dry]), (dry, [falls]), (falls, [dry])
+    offered = {
+        m.effects: {m.effects[1]: others, "deadband": []} for m, others in stages
+    }
     offer(monkeypatch, offered, without)
     for shown, takes in ((False, dry), (True, falls)):
         judge = SimpleNamespace(problem="equations", output="angle")
         judge.confirms = lambda smaller, larger: True
+        judge.explains = lambda smaller, larger: False
         judge.shows = lambda smaller, larger, shown=shown: shown
-        assert exchange.exchanged(problem, dry, base, judge)[0] is takes
+        for first in (dry, wrong, takes):
+            assert exchange.exchanged(searched.problem, first, base, judge)[0] is takes
+    judge.shows = lambda smaller, larger: False
+    assert exchange.exchanged(searched.problem, falls, base, judge)[0] is dry
 
 
 def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(searched):
