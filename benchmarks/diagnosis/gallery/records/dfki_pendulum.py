@@ -38,7 +38,7 @@ RECORD = Record(
     made=_made,
     remark="Right by the rule, and barely: some dry friction of 0.2 N·m, as the "
     "authors have, by 14 nat, and which kind stays open. The shifted load beside it, "
-    "of 13 nat, is documented by nobody, and that there is no effect has 55 %: the "
+    "of 13 nat, is documented by nobody, and that there is no effect has 31 %: the "
     "torque of these records is that of 10 s, and 0.2 N·m of it is noise. The answer "
     "before was not_observable.",
 )

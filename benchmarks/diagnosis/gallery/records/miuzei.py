@@ -69,6 +69,6 @@ RECORD = Record(
     where="src/sysid/dataset/dataset.json, `targets`; src/sysid/desc/robot.xml",
     made=_made,
     remark="Wrong. Gains, friction, rotor and low-pass are all free here, since nobody"
-    " knows them, and a load that lies elsewhere takes up what the motion "
-    "lacks.",
+    " knows them, and a load that lies elsewhere, or an encoder that is "
+    "zero elsewhere, takes up what the motion lacks.",
 )

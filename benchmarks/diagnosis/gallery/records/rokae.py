@@ -39,12 +39,12 @@ RECORD = Record(
     "friction of up to 0.58 N·m·s/rad in four",
     where="scripts/data_output/dynamics_parameters_friction.csv",
     made=_made,
-    remark="Right by the rule, for joint 1 alone, where by its probabilities no effect "
-    "is likelier: Coulomb friction of 0.41 N·m; the authors have 0.1 to 0.43 in every "
-    "joint. In joints 3, 5, 6 and 7 dry friction is found of the size that they give "
-    "(0.30, 0.17, 0.19, 0.06 N·m), but as Dahl's, which needs 0.3 to 5 mrad to build "
-    "up, or as one that depends on the direction. Joints turn by a tenth of those "
-    "milliradians between two rows when they reverse, so the records do show it; "
-    "Coulomb friction alone gains half as much. The answer before named none in joint "
-    "1 and was wrong.",
+    remark="Right by the rule, for joint 1 alone, where its probability is 49 % and "
+    "that of no effect 43 %: Coulomb friction of 0.41 N·m; the authors have 0.1"
+    " to 0.43 in every joint. In joints 3, 5, 6 and 7 dry friction is found of "
+    "the size that they give (0.30, 0.17, 0.19, 0.06 N·m), but as Dahl's, which"
+    " needs 0.3 to 5 mrad to build up, or as one that depends on the direction."
+    " Joints turn by a tenth of those milliradians between two rows when they "
+    "reverse, so the records do show it; Coulomb friction alone gains half as "
+    "much. The answer before named none in joint 1 and was wrong.",
 )

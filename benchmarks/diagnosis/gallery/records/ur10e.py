@@ -102,7 +102,8 @@ RECORD = Record(
     where="estimate_drive_gains.m, lines 18 to 20; Frontiers in Robotics and AI 7, "
     "2020, doi 10.3389/frobt.2020.571574",
     made=_made,
-    remark="Right: the load, in both joints that carry it far out, and nothing else. "
-    "Its size is half of what it is: its place at the flange is assumed, and "
-    "masses may be 5 % off. By its probabilities no effect is likelier.",
+    remark="Right: the load, in the shoulder, and nothing else; the elbow, which "
+    "carries it far out as well, does not name it any more. Its size is half of"
+    " what it is: its place at the flange is assumed, and masses may be 5 % "
+    "off. By its probabilities no effect is likelier.",
 )
