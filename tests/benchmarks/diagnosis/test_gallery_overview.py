@@ -49,7 +49,8 @@ def test_another_answer_is_another_page(rows, name, change):
 
 def test_a_size_is_on_the_page(rows):
     mass = row_of(rows, "ur10e_payload")["causes"][0]["parameters"]["mass_kg"]
-    assert f"{mass['value']:.3g} ({mass['low']:.3g} to " in overview(RECORDS, rows)
+    size, low, high = (f"{mass[name]:.3g}" for name in ("value", "low", "high"))
+    assert f"{size} ({low} to {high}) kg" in overview(RECORDS, rows)
     mass.update(value=1.4, low=0.754, high=2.05)
     assert "1.4 (0.754 to 2.05) kg" in overview(RECORDS, rows)
     mass["low"] = -0.3
