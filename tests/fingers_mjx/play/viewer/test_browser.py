@@ -64,20 +64,57 @@ def pixels(shot):
     return np.asarray(Image.open(io.BytesIO(shot)))[..., :3].astype(int)
 
 
-def test_a_person_sees_a_hand_that_moves_and_can_stop_it(watched):
+@pytest.fixture
+def held(monkeypatch):
+    """Lets no simulation pass its first second before it is set.
+
+    A picture of it is the same on a slow machine then.
+    """
+    over, step = threading.Event(), Live.step
+
+    def wait(self, wishes):
+        return None if self.time_s >= 1.0 and not over.is_set() else step(self, wishes)
+
+    monkeypatch.setattr(Live, "step", wait)
+    return over
+
+
+def middle_of(tab):
+    return pixels(tab.picture())[250:500, 450:950]
+
+
+def settled(tab):
+    """A picture in which nothing moves any more."""
+    seen = pixels(tab.picture())
+    for _ in range(60):
+        time.sleep(0.5)
+        before, seen = seen, pixels(tab.picture())
+        if np.array_equal(before, seen):
+            return seen
+    raise AssertionError("the page goes on moving")
+
+
+def force_pixels(middle):
+    red, green, blue = np.moveaxis(middle, 2, 0)
+    return ((red - green > 90) & (green < 60) & (blue > green)).sum()
+
+
+def test_a_person_sees_a_hand_that_moves_and_can_stop_it(watched, held):
     with page_of(watched) as tab:
         for text in ("forward [m/s]", "contact forces", "thumb", "mm/s"):
             tab.wait_for(text)
+        tab.wait_for("running, 1.0 s")
+        until(lambda: force_pixels(middle_of(tab)) > 150)
+        middle = middle_of(tab)
+        held.set()
+        until(lambda: np.any(middle_of(tab) != middle))
         tab.click("pause")
         tab.wait_for("paused")
-        shot = tab.picture()
+        settled(tab)
         assert tab.errors == []
-    middle = pixels(shot)[250:500, 450:950]
     colourful = middle.max(axis=2) - middle.min(axis=2) > 80
     assert colourful.sum() > 300, "no finger is to be seen in the middle"
-    red, green, blue = np.moveaxis(middle, 2, 0)
-    force = (red - green > 90) & (green < 60) & (blue > green)
-    assert force.sum() > 150, "no contact force is to be seen"
+    assert force_pixels(middle) > 150, "no contact force is to be seen"
 
 
 def test_knobs_reach_the_simulation(watched, wished):
@@ -98,7 +135,7 @@ def test_knobs_reach_the_simulation(watched, wished):
     assert sum(w.push is not None for w in wished) == 1
 
 
-def test_a_measured_log_stands_beside_the_hand(watched):
+def test_a_measured_log_stands_beside_the_hand(watched, held):
     hand = default_hand()
     stance, t_s = stance_of(hand), 0.02 * np.arange(500)
     columns = {
@@ -114,8 +151,9 @@ def test_a_measured_log_stands_beside_the_hand(watched):
         with page_of(dataclasses.replace(watched, log=log_or_none)) as tab:
             if log_or_none is not None:
                 tab.wait_for("measured: walk.csv")
+            tab.wait_for("running, 1.0 s")
             tab.click("pause")
             tab.wait_for("paused")
-            shots.append(pixels(tab.picture())[100:600, 300:1000])
+            shots.append(settled(tab)[100:600, 300:1000])
     blue = [(s[..., 2] - s[..., 0] > 60).sum() for s in shots]
     assert blue[0] > 1.5 * blue[1] + 300, "no second hand is to be seen"
