@@ -41,6 +41,7 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         "stray_presses": "lower",
         "max_tilt_deg": "lower",
         "stance_drift_mm": "lower",
+        "least_support_fraction": "higher",
         **STANDING,
     },
     "push": {

@@ -2,10 +2,12 @@
 
 from collections.abc import Mapping
 
+import jax
 import jax.numpy as jnp
 from jaxtyping import Array, Bool, Float, Shaped
 
 from envs.tasks.keyboard.model import KEY_NAMES
+from rewards.gates import FORCE_THRESHOLD_N, in_contact
 
 
 def press_measures(
@@ -18,7 +20,9 @@ def press_measures(
     step in which the request is first seen to the end of the one in which the key
     closes (paper: command issue to recorded outcome). `wrong_<key>` counts requests
     that this key decided wrongly. `stance_drift_mm` is the mean distance of the
-    supporting tips at the end from where they stood half a second into the episode.
+    supporting tips at the end from where they stood half a second into the episode, and
+    `least_support_fraction` the share of the steps in which the supporting finger that
+    stands least has contact: near 0 if one hangs in the air, whatever its drift.
 
     Args:
         recorded: signals over T steps, see `Keyboard.scene_signals` in
@@ -27,10 +31,10 @@ def press_measures(
 
     Returns:
         Fractions and counts [1], latencies [s], tilt [°], drift [mm]; NaN where nothing
-        was decided.
+        was decided, and for supports where no step counts.
 
     Source:
-        Paper, keyboard pressing; stray presses and drift are ours.
+        Paper, keyboard pressing; stray presses, drift and supports are ours.
     """
     hit, wrong, timeout, stray = (
         recorded[name] * counts for name in ("hit", "wrong", "timeout", "stray")
@@ -50,7 +54,16 @@ def press_measures(
         **{f"wrong_{n}": by_key[i] for i, n in enumerate(KEY_NAMES)},
         "max_tilt_deg": jnp.max(tilt_deg),
         "stance_drift_mm": 1e3 * _drift_m(recorded["support_pos_w"], counts),
+        "least_support_fraction": _least_support(recorded["support_force_n"], counts),
     }
+
+
+def _least_support(
+    support_force_n: Float[Array, "T tips"], counts: Bool[Array, " T"]
+) -> Float[Array, ""]:
+    """Share of the steps that count in which the tip that stands least stands [1]."""
+    stands = jax.vmap(in_contact, (0, None))(support_force_n, FORCE_THRESHOLD_N)
+    return jnp.min(jnp.sum(stands & counts[:, None], axis=0)) / jnp.sum(counts)
 
 
 def _drift_m(

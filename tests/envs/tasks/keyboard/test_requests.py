@@ -119,6 +119,7 @@ def recorded(steps=100):
         "tilt_deg": zero.copy(),
         "key_pressed": np.zeros((steps, KEYS)),
         "support_pos_w": np.zeros((steps, 4, 2)),
+        "support_force_n": np.full((steps, 4), 2.0),
     }
 
 
@@ -139,6 +140,8 @@ def test_measures_of_an_episode():
     trace["stray"][80] = 1
     trace["tilt_deg"][20] = 5.0
     trace["support_pos_w"][50:] = [0.003, 0.004]
+    trace["support_force_n"][50:75, 2] = 0.0
+    trace["support_force_n"][90:, 0] = 0.0
     found = measured(trace)
     assert found["requests"] == 5 and found["correct_fraction"] == pytest.approx(0.6)
     assert found["latency_median_s"] == pytest.approx(0.2)
@@ -148,6 +151,7 @@ def test_measures_of_an_episode():
     assert (found["wrong_presses"], found["timeouts"]) == (1.0, 1.0)
     assert (found["stray_presses"], found["max_tilt_deg"]) == (1.0, 5.0)
     assert found["stance_drift_mm"] == pytest.approx(5.0, rel=1e-5)
+    assert found["least_support_fraction"] == 0.75
 
 
 def test_only_steps_that_count_are_measured():
@@ -155,8 +159,10 @@ def test_only_steps_that_count_are_measured():
     trace["hit"][[10, 60]], trace["latency_s"][[10, 60]] = 1, 0.2
     trace["tilt_deg"][60:] = 90.0
     trace["support_pos_w"][40:] = 1.0
+    trace["support_force_n"][40:] = 0.0
     found = measured(trace, np.arange(100) < 40)
     assert found["requests"] == 1 and found["max_tilt_deg"] == 0.0
     assert found["stance_drift_mm"] == 0.0
+    assert found["least_support_fraction"] == 1.0
     empty = measured(trace, np.zeros(100, bool))
     assert np.isnan(empty["correct_fraction"]) and np.isnan(empty["latency_median_s"])
