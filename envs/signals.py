@@ -35,6 +35,7 @@ class Signals:
         tip_vel_v: fingertip velocities relative to the rotating base in V [m/s].
         tip_vel_w: fingertip velocities in the world [m/s].
         tip_force_n: magnitude of the ground contact force on each fingertip [N].
+        tip_shear_n: magnitude of its part along the ground [N].
         pad_tilt_rad: elevation of each pad normal above the horizontal; +π/2 stands on
             the nail.
         link_contact: 1 for each non-fingertip finger link that touches the ground.
@@ -60,6 +61,7 @@ class Signals:
     tip_vel_v: Float[Array, "*b tips 3"]
     tip_vel_w: Float[Array, "*b tips 3"]
     tip_force_n: Float[Array, "*b tips"]
+    tip_shear_n: Float[Array, "*b tips"]
     pad_tilt_rad: Float[Array, "*b tips"]
     link_contact: Float[Array, "*b links"]
     palm_contact: Float[Array, "*b"]
@@ -131,7 +133,7 @@ def extract_signals(
         vel_v=unrotate(v_quat_w, state.qvel[:3]),
         angvel_v=unrotate(q_off, angvel_b),
         **_tip_signals(spec, sensors),
-        tip_force_n=_tip_force(spec, sensors),
+        **_tip_forces(spec, sensors),
         link_contact=_touching(spec, sensors, spec.other_links),
         palm_contact=jnp.max(_touching(spec, sensors, (PALM, PAYLOAD))),
         tilt_rad=tilt(v_quat_w),
@@ -208,10 +210,19 @@ def _tip_signals(
     }
 
 
-def _tip_force(spec: HandSpec, sensors: Float[Array, " n"]) -> Float[Array, " tips"]:
-    """Magnitude of the floor's force on each tip [N]."""
-    force = _stack(spec, sensors, "force", spec.tip_spheres)
-    return jnp.sqrt(jnp.sum(force**2, axis=-1))
+def _tip_forces(
+    spec: HandSpec, sensors: Float[Array, " n"]
+) -> dict[str, Float[Array, " tips"]]:
+    """Magnitude of the floor's force on each tip, and of its part along the floor [N].
+
+    The sensors give the force in the contact's frame, whose first axis is the normal.
+    """
+    squares = _stack(spec, sensors, "force", spec.tip_spheres) ** 2
+    along = jnp.sum(squares[:, 1:], axis=-1)
+    return {
+        "tip_force_n": jnp.sqrt(jnp.sum(squares, axis=-1)),
+        "tip_shear_n": jnp.sqrt(along),
+    }
 
 
 def _touching(

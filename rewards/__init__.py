@@ -34,7 +34,7 @@ from rewards.compose import (
     table_weights,
     weights_at,
 )
-from rewards.contact import foot_slide, undesired_contact
+from rewards.contact import foot_slide, shear_excess, undesired_contact
 from rewards.direction import swing_against_command
 from rewards.effort import joint_acceleration, overload, target_lag, torque
 from rewards.footprint import (
@@ -140,6 +140,7 @@ __all__ = [
     "requested_depth",
     "roll_pitch_rate",
     "safe_norm",
+    "shear_excess",
     "smoothstep",
     "stance_height",
     "stance_pose",

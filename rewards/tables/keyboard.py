@@ -12,7 +12,7 @@ knows where the keys are.
 """
 
 from rewards.compose import RewardTable, RewardTerm, precomputed
-from rewards.contact import foot_slide
+from rewards.contact import foot_slide, shear_excess
 from rewards.keyboard import (
     fingertip_distance,
     keys_touched,
@@ -44,6 +44,7 @@ KEYBOARD: RewardTable = (
     RewardTerm("stance_lost", precomputed, -500.0, ("stance_lost",)),
     RewardTerm("drift", support_drift, -30.0, ("support_pos_w", "support_start_w")),
     RewardTerm("slide", foot_slide, -1.0, ("support_vel_w", "support_force_n")),
+    RewardTerm("shear", shear_excess, 0.0, ("support_shear_n", "support_force_n")),
     RewardTerm("tilt", flat_orientation, -2.0, ("gravity_v",)),
     *REGULARIZERS,
 )

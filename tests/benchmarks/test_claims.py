@@ -23,6 +23,8 @@ MEMBERS = {
     "steering_sideways": (2, 2),
     "push_effort": (2, 1),
     "keyboard_creep": (6, 1),
+    "keyboard_planted": (3, 1),
+    "keyboard_shear": (4, 1),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }

@@ -20,6 +20,7 @@ BOUNDS = {
     "obs.privileged_state": 2e-2,
     "reward": 5e-5,
     "tip_force_n": 2e-2,
+    "tip_shear_n": 2e-2,
     "torque_nm": 2e-3,
     "tip_pos_v": 5e-5,
     "tip_vel_v": 5e-3,

@@ -139,6 +139,13 @@ def test_tip_forces_are_those_of_the_contact_list(moving):
     assert np.max(expected) > 1.0
 
 
+def test_shear_is_the_horizontal_part_of_the_tip_forces(moving):
+    forces_w = np.array([floor_force(moving, link) for link in SPEC.tip_spheres])
+    expected = np.linalg.norm(forces_w[:, :2], axis=1)
+    np.testing.assert_allclose(read(moving).tip_shear_n, expected, rtol=1e-5, atol=1e-5)
+    assert 0.05 < np.max(expected) < np.max(forces_w[:, 2])
+
+
 def test_at_rest_the_tips_carry_the_weight():
     data = mujoco.MjData(MODEL)
     data.qpos[:], data.ctrl[:] = STANCE.qpos, STANCE.target_rad

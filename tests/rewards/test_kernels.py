@@ -81,6 +81,7 @@ KERNELS = {
     "action_rate": Kernel(rewards.action_rate, (JOINTS, JOINTS)),
     "undesired_contact": Kernel(rewards.undesired_contact, (((15,), 1.0),)),
     "foot_slide": Kernel(rewards.foot_slide, (TIPS, FORCE), planar=(0,), tips=True),
+    "shear_excess": Kernel(rewards.shear_excess, (FORCE, FORCE), tips=True),
     "air_time_step": Kernel(
         air_time_value,
         (((5,), 0.5), FORCE, PLANAR),

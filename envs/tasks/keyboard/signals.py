@@ -97,6 +97,7 @@ def support_signals(
         "support_start_w": start_w,
         "support_vel_w": signals.tip_vel_w[others],
         "support_force_n": signals.tip_force_n[others],
+        "support_shear_n": signals.tip_shear_n[others],
         "drift_m": drift_m,
         "gravity_v": gravity_v,
         "tilt_deg": jnp.rad2deg(tilt_from_level(gravity_v)),

@@ -183,8 +183,8 @@ class Keyboard(HandTask):
             requested: 1 at the requested key; asked, idle: whether there is a request.
             hit, wrong, timeout, latency_s, stray: see `Outcome`.
             arrow_offset_m, goal_offset_m, hover_offset_m [m]: see `goal_offsets`.
-            support_pos_w, support_start_w, support_vel_w, support_force_n: of the
-            other tips. drift_m, tilt_deg, gravity_v, stance_lost: of the stance.
+            support_pos_w, _start_w, _vel_w, _force_n, _shear_n: of the other tips.
+            drift_m, tilt_deg, gravity_v, stance_lost: of the stance.
 
         Source:
             Paper, keyboard pressing; the loss of stance is ours.
