@@ -37,6 +37,7 @@ def signals(time, speed, command):
         tip_vel_v=jnp.zeros((batch, 5, 3)),
         tip_vel_w=jnp.zeros((batch, 5, 3)),
         tip_force_n=tap,
+        tip_shear_n=0.1 * tap,
         pad_tilt_rad=jnp.full((batch, 5), 0.4),
         link_contact=jnp.zeros((batch, 14)),
         palm_contact=jnp.zeros(batch),

@@ -82,6 +82,7 @@ class TurningHands:
             vel_v=carried.command.at[:, 2].set(0.0),
             angvel_v=vectors.at[:, 2].set(rate),
             tip_force_n=jnp.ones((WORLDS, 5)),
+            tip_shear_n=jnp.zeros((WORLDS, 5)),
             pad_tilt_rad=jnp.zeros((WORLDS, 5)),
             link_contact=jnp.zeros((WORLDS, 14)),
             palm_contact=zero,
