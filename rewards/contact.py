@@ -7,7 +7,7 @@ from rewards.gates import FORCE_THRESHOLD_N, in_contact
 from rewards.shaping import Scalar, safe_norm
 
 SLIPPERY = 0.25
-"""μ of a floor on which no tip should slip, below all that training draws; ours."""
+"""μ of a floor on which no tip should slip, below what tasks draw by default; ours."""
 
 
 def undesired_contact(link_contact: Float[Array, " links"]) -> Float[Array, ""]:
