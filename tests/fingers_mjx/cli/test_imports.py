@@ -224,7 +224,7 @@ def test_settings_that_name_rewards_need_their_tables_and_no_simulator():
     lines, status, said, loaded = printed("play", f"{policy}", "--dry-run")
     assert (status, said) == (0, "") and set(loaded) <= {"numpy", "jax", "flax"}
     assert "height_m: 0.0" in map(str.strip, lines)
-    assert "weights: {slide: -30.0}" in map(str.strip, lines)
+    assert any("shear: -20.0}" in line for line in lines)
 
 
 @pytest.mark.parametrize("command", ["eval", "play"])
