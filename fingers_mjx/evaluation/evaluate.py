@@ -1,7 +1,7 @@
 """Evaluation: many randomized episodes of one policy, measured one by one."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 
 import jax
@@ -11,6 +11,7 @@ from jaxtyping import Array, Float, PRNGKeyArray
 
 from envs.base import State, VectorEnv
 from envs.errors import InputError
+from fingers_mjx.evaluation.draws import world_columns
 from fingers_mjx.evaluation.measures import steps_alive
 from fingers_mjx.evaluation.record import MASS_KG, Trace, episode_measures, record
 
@@ -28,11 +29,14 @@ class EpisodeTable:
         columns: name of a measure to one value per episode; NaN means undefined.
         traces: NumPy arrays, axes time and episode first.
         dt_s: control interval.
+        worlds: what was drawn for the world of each episode
+            (`draws.world_columns`).
     """
 
     columns: dict[str, np.ndarray]
     traces: Trace
     dt_s: float
+    worlds: dict[str, np.ndarray] = field(default_factory=dict)
 
     def episode(self, index: int) -> Trace:
         """Returns the steps of one episode that count, time first."""
@@ -104,8 +108,8 @@ def evaluate(
         measuring: what is measured.
         progress: called with (steps done, steps in all) from time to time.
     """
-    traces = run_episodes(env, policy, episodes, progress)
-    return episode_table(traces, float(env.dt), measuring)
+    traces, worlds = run_episodes(env, policy, episodes, progress)
+    return episode_table(traces, float(env.dt), measuring, worlds)
 
 
 def run_episodes(
@@ -113,8 +117,8 @@ def run_episodes(
     policy: Policy,
     episodes: Episodes,
     progress: Progress | None = None,
-) -> Trace:
-    """Returns the traces of as many episodes, for `episode_table`.
+) -> tuple[Trace, dict[str, np.ndarray]]:
+    """Returns traces and worlds of as many episodes, for `episode_table`.
 
     Args:
         env: as in `evaluate`, as the rest.
@@ -123,7 +127,8 @@ def run_episodes(
         progress: called with (steps done, steps in all) from time to time.
 
     Returns:
-        NumPy arrays, axes time and episode first.
+        NumPy arrays: of the traces axes time and episode first, and what was drawn for
+        the world of each episode.
 
     Source:
         Ours.
@@ -132,31 +137,39 @@ def run_episodes(
     stretch = min(REPORT_EVERY, steps)
     # In one program: on a GPU single steps would wait for their launch, each anew.
     advance = jax.jit(partial(_advance, env, stretch))
-    rollouts, reset, policy = [], jax.jit(env.reset), Partial(policy)
+    rollouts, drawn, reset, policy = [], [], jax.jit(env.reset), Partial(policy)
     while (count := sum(r.done.shape[1] for r in rollouts)) < number:
         state = reset(jax.random.fold_in(episodes.key, len(rollouts)))
         worlds = len(state.done)
+        drawn.append(world_columns(state))
         report = _reporting(
             progress, count // worlds * steps, -(-number // worlds) * steps
         )
         rollouts.append(_rollout(partial(advance, policy), state, steps, report))
-    return jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
+    traces = jax.tree.map(lambda *x: np.concatenate(x, 1)[:, :number], *rollouts)
+    return traces, jax.tree.map(lambda *x: np.concatenate(x)[:number], *drawn)
 
 
-def episode_table(traces: Trace, dt_s: float, measuring: Measuring) -> EpisodeTable:
+def episode_table(
+    traces: Trace,
+    dt_s: float,
+    measuring: Measuring,
+    worlds: dict[str, np.ndarray] | None = None,
+) -> EpisodeTable:
     """Measures recorded episodes.
 
     Args:
         traces: NumPy arrays, axes time and episode first.
         dt_s: control interval.
         measuring: what is measured.
+        worlds: what was drawn for the world of each episode, if it is known.
     """
     found = _measures(traces, dt_s, measuring.mass_kg)
     if measuring.task_measures is not None:
         own = partial(_task_measures, measuring.task_measures)
         found = found | jax.vmap(own, 1)(traces)
     columns = {name: np.asarray(values, float) for name, values in found.items()}
-    return EpisodeTable(columns, traces, dt_s)
+    return EpisodeTable(columns, traces, dt_s, worlds or {})
 
 
 def _task_measures(measure: TaskMeasures, trace: Trace) -> dict[str, Array]:

@@ -151,7 +151,7 @@ def write_evaluation(
     """
     directory.mkdir(parents=True, exist_ok=True)
     notes = {k: str(v) for k, v in about.items() if k != "measures"}
-    write_table(directory / TABLE_FILE, table.columns, notes)
+    write_table(directory / TABLE_FILE, table.columns | table.worlds, notes)
     for name, figure in evaluation_figures(table).items():
         figure.savefig(directory / f"{name}.png")
     write_summary(directory / SUMMARY_FILE, about)

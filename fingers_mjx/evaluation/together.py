@@ -68,7 +68,7 @@ def evaluate_together(
     """
     number = len(sources)
     batch = make_env(sources[0].setup, number * episodes, backend, auto_reset=False)
-    traces = run_episodes(
+    traces, worlds = run_episodes(
         _Alike(batch, number),
         acting_together([one.network for one in sources]),
         Episodes(number * episodes, batch.episode_length, jax.random.key(seed)),
@@ -77,5 +77,6 @@ def evaluate_together(
     found = []
     for first in range(0, number * episodes, episodes):
         own = jax.tree.map(lambda x, i=first: x[:, i : i + episodes], traces)
-        found.append(episode_table(own, float(batch.dt), measuring(batch)))
+        drawn = {name: of[first : first + episodes] for name, of in worlds.items()}
+        found.append(episode_table(own, float(batch.dt), measuring(batch), drawn))
     return found

@@ -101,7 +101,7 @@ def test_evaluation_of_a_run_is_kept_with_it(bundle_dir, run_dir):
     for measure in summary["measures"].values():
         assert set(measure) >= {"mean", "std", "n"}
     table = read_table(run_dir / "eval/episodes.parquet")
-    assert len(table["survival"]) == 3
+    assert len(table["survival"]) == len(table["world/tip_friction"]) == 3
     pictures = {p.stem for p in (run_dir / "eval").glob("*.png")}
     assert pictures == {"gait", "feet", "tracking", "tracking_in_time"}
 

@@ -8,6 +8,8 @@ import pytest
 
 from envs.base import State
 from envs.errors import InputError
+from envs.memory import Memory, PerWorldState
+from envs.randomize import Variation
 from envs.signals import Signals
 from fingers_mjx.evaluation.evaluate import Episodes, Measuring, evaluate
 from fingers_mjx.evaluation.files import summary_document
@@ -81,6 +83,29 @@ class GlidingHands:
             signals=signals(time, speed, command),
             memory=None,
         )
+
+
+@dataclass(frozen=True)
+class DrawnHands(GlidingHands):
+    """Each draws the number that it observes, as the friction of its tips."""
+
+    def _state(self, time, speed, start):
+        state, zero = super()._state(time, speed, start), 0 * start
+        wide, vector = jnp.zeros((len(start), 20)), jnp.zeros((len(start), 3))
+        drawn = Variation(
+            tip_friction=start,
+            stiffness_scale=wide.at[:, 7].set(start),
+            damping_scale=wide,
+            effort_scale=zero,
+            payload_com_m=vector,
+            payload_mass_scale=zero,
+            palm_mass_scale=zero,
+            palm_com_m=vector.at[:, 2].set(start),
+            imu_rotation_rad=vector,
+            gyro_bias_rps=vector,
+        )
+        world = PerWorldState(None, drawn, {}, zero, zero)
+        return state.replace(memory=Memory(world, zero, None, wide, wide, None, vector))
 
 
 def constant_speed(obs):
@@ -157,6 +182,21 @@ def test_batches_are_run_until_there_are_enough_episodes():
     assert len(np.unique(speeds)) == 7, "batches must not repeat each other"
     assert reported[-1] == (300, 300)
     assert reported == sorted(reported)
+
+
+@pytest.mark.parametrize("auto_reset", [False, True])
+def test_what_was_drawn_stands_in_the_row_of_its_episode(auto_reset):
+    wanted = Episodes(5, 100, jax.random.key(5))
+    table = evaluate(
+        DrawnHands((0, 40, 0), auto_reset), lambda obs: obs["state"], wanted
+    )
+    speed, drawn = table.columns["task_speed_mps"], table.worlds
+    assert len(np.unique(speed)) == 5
+    for name in ("tip_friction", "stiffness_scale_7", "palm_com_m_z"):
+        np.testing.assert_allclose(drawn[f"world/{name}"], speed, rtol=1e-5)
+    assert not drawn["world/stiffness_scale_6"].any()
+    assert not drawn["world/palm_com_m_x"].any()
+    assert not run().worlds
 
 
 def test_the_key_decides_the_episodes():

@@ -52,6 +52,8 @@ def test_to_the_last_bit_each_has_the_episodes_that_it_has_alone(
     for name, column in alone.columns.items():
         np.testing.assert_array_equal(found.columns[name], column, err_msg=name)
     jax.tree.map(np.testing.assert_array_equal, found.traces, alone.traces)
+    assert len(np.unique(alone.worlds["world/tip_friction"])) == 3
+    jax.tree.map(np.testing.assert_array_equal, found.worlds, alone.worlds)
 
 
 def test_each_policy_acts_in_its_own_worlds(together):
