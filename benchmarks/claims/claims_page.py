@@ -183,8 +183,8 @@ def _chosen(stock: Results) -> str:
     part = sum(five.values()) / len(five)
     return text + (
         f"All five of its fingers take part in {part:.2f} of the\nepisodes, in the "
-        "mean over its seeds, and a tip that never touches the floor does not\n"
-        "count in how the worst tip plants."
+        "mean over its seeds. A tip that never touches the floor does not\n"
+        "count in how the worst tip plants; how often there is one was not counted."
     )
 
 

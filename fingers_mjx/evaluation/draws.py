@@ -1,4 +1,4 @@
-"""What the worlds of an evaluation differ in, to be looked at beside the measures."""
+"""What the hands of an evaluation differ in, to be looked at beside the measures."""
 
 import numpy as np
 
@@ -6,11 +6,14 @@ from envs.base import State
 from envs.memory import Memory
 
 AXES = "xyz"
+OF_JOINTS = ("stiffness_scale", "damping_scale")
 PREFIX = "world/"
 
 
 def world_columns(state: State) -> dict[str, np.ndarray]:
-    """Returns the draws of the domain randomization, a column each.
+    """Returns what the randomization of the hand drew, a column each.
+
+    What a task draws, such as the springs of a keyboard, is not among them.
 
     Vectors have a column for each axis, "world/palm_com_m_x", and quantities of the
     joints one for each joint in the order of the actions, "world/stiffness_scale_0".
@@ -33,7 +36,7 @@ def world_columns(state: State) -> dict[str, np.ndarray]:
         if values.ndim == 1:
             columns[PREFIX + name] = values
             continue
-        ends = AXES if values.shape[1] == len(AXES) else range(values.shape[1])
+        ends = range(values.shape[1]) if name in OF_JOINTS else AXES
         parts = zip(ends, values.T, strict=True)
         columns |= {f"{PREFIX}{name}_{end}": part for end, part in parts}
     return columns

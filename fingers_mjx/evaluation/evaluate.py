@@ -29,7 +29,7 @@ class EpisodeTable:
         columns: name of a measure to one value per episode; NaN means undefined.
         traces: NumPy arrays, axes time and episode first.
         dt_s: control interval.
-        worlds: what was drawn for the world of each episode
+        worlds: what the randomization of the hand drew for the world of each episode
             (`draws.world_columns`).
     """
 

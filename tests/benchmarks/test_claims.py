@@ -25,6 +25,8 @@ MEMBERS = {
     "keyboard_creep": (6, 1),
     "keyboard_planted": (3, 1),
     "keyboard_shear": (4, 1),
+    "keyboard_still": (2, 2),
+    "steering_doubled": (2, 2),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }
