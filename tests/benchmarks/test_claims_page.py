@@ -11,6 +11,7 @@ from support.synthetic_sweep import write_sweep
 from benchmarks.claims import claims_page, sweeps
 from benchmarks.claims.claims import (
     CLAIMS,
+    FIVE,
     MORE_CLAIMS,
     SEEDS,
     SPEED,
@@ -123,6 +124,15 @@ def test_tuned_stock_is_what_is_fastest_on_the_seeds_of_its_test():
     assert chosen(stock("a")) == "a" and chosen(stock("b")) == "b"
     assert chosen(stock("b", [("a", TEST[0])])) is None
     assert chosen(NONE) is None
+
+
+def test_the_page_says_how_many_fingers_tuned_stock_uses_if_it_is_known():
+    without, known = stock("b"), stock("b")
+    known.values["b"][FIVE] = {2: 0.5, 3: 0.0}
+    known.values["a"][FIVE] = {2: 1.0}
+    pages = [page(made(0.01), tuned, NONE) for tuned in (without, known)]
+    assert ["take part in 0.25 of" in text for text in pages] == [False, True]
+    assert ["take part" in text for text in pages] == [False, True]
 
 
 def test_the_chosen_setting_is_compared_as_tuned_stock():
