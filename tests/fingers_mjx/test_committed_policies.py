@@ -65,6 +65,6 @@ def test_the_text_states_what_was_measured(folder):
         value = measured["measures"][name]
         spellings = [
             f"{value['mean']:.{digits}f} ({value['low']:.{digits}f}–"
-            for digits in (2, 3, 4)
+            for digits in (2, 3)
         ]
         assert any(stated in text for stated in spellings), (name, spellings)
