@@ -27,6 +27,7 @@ MEMBERS = {
     "keyboard_shear": (4, 1),
     "keyboard_still": (2, 2),
     "steering_doubled": (2, 2),
+    "steering_long": (2, 1),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }
