@@ -7,6 +7,9 @@ QUICK := tests/test_layers.py tests/test_house.py tests/test_words.py \
 	tests/test_documentation.py tests/rewards
 TWO := -n 2 --dist loadfile --max-worker-restart 0 # a crash ends it
 DIAGNOSES := tests/sysid/diagnosis tests/benchmarks/diagnosis
+# Where bits and numbers of worlds are what is tested, programs are those of users.
+COMPUTING := tests/envs tests/rewards tests/fingers_mjx/ppo tests/fingers_mjx/training \
+	tests/fingers_mjx/runs tests/fingers_mjx/evaluation tests/sysid/calibration
 LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged_runs.py
 
 .DEFAULT_GOAL := help
@@ -43,7 +46,8 @@ check: sync ## What CI runs first: style, types, quick tests; changes nothing
 	$(RUN) pytest -q -n 2 $(QUICK)
 
 test: sync ## All tests for two CPU cores
-	$(RUN) pytest tests $(DIAGNOSES:%=--ignore=%) $(TWO)
+	$(RUN) pytest $(COMPUTING) $(TWO)
+	$(RUN) pytest tests $(COMPUTING:%=--ignore=%) $(DIAGNOSES:%=--ignore=%) --quick-compile $(TWO)
 	$(RUN) pytest $(DIAGNOSES) --whole-loops $(TWO)
 	$(RUN) pytest deploy/tests # alone: some of them run in real time
 

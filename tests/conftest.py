@@ -1,6 +1,7 @@
 """Runs shape annotations as checks, and watches the interpreter (X1, X3)."""
 
 import gc
+import os
 import sys
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import pytest
 from jaxtyping import config, install_import_hook
 from support import shapes
 
+from envs.config.xla_flags import add_flags
 from envs.rounding import fix_rounding
 
 fix_rounding()  # as the commands do
@@ -18,19 +20,30 @@ CHECKER = f"{shapes.__name__}.{shapes.check_arrays.__name__}"
 SHAPED = ["rewards", "envs", "sysid"]
 install_import_hook(SHAPED, CHECKER)
 
+QUICK_COMPILE = (
+    "--xla_backend_optimization_level=0",
+    "--xla_cpu_use_fusion_emitters=false",
+)
+"""Flags of XLA with which a step of an environment is compiled in less than half of the
+time; most tests compile more than they compute."""
+
 NETWORK = ("socket.connect", "socket.sendto", "socket.bind", "socket.getaddrinfo")
 UNSAFE = ("pickle.find_class", "os.system")
 LOOPBACK = ("127.0.0.1", "::1", "localhost", "")
 
 
 def pytest_addoption(parser):
-    """Adds how the tests of diagnoses are run by `make test`."""
+    """Adds the two ways of compiling of `make test`."""
     words = "compile loops over time as the command that diagnoses does"
     parser.addoption("--whole-loops", action="store_true", help=words)
+    words = "compile quickly, to programs that are slower and may round otherwise"
+    parser.addoption("--quick-compile", action="store_true", help=words)
 
 
 def pytest_configure(config):
-    """Asks for whole loops before anything is computed; also in every worker."""
+    """Asks for a way of compiling before anything is computed; also in workers."""
+    if config.getoption("--quick-compile"):
+        add_flags(os.environ, QUICK_COMPILE)
     if config.getoption("--whole-loops"):
         # Not before the hook above: what it imports is checked, too.
         from sysid.diagnosis.whole_loops import compile_loops_whole
