@@ -26,8 +26,10 @@ MEMBERS = {
     "keyboard_planted": (3, 1),
     "keyboard_shear": (4, 1),
     "keyboard_still": (2, 2),
+    "keyboard_stiller": (2, 2),
     "steering_doubled": (2, 2),
     "steering_long": (2, 1),
+    "steering_speed": (2, 2),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }
