@@ -28,7 +28,8 @@ TEXT = """\
 
 {number} of {planned} records of seed {seed}, which was drawn by the machine after the
 code was fixed (commit {commit}); none of them was tuned on. They were made in parts, on
-two cores and on machines with 32 beside trainings; what is missing had not ended.
+two cores and on machines with 32 beside trainings; what is missing had not ended. What
+has been changed since by what they missed is in the [history](diagnosis_history.md).
 Hidden effects come from
 another simulator (C MuJoCo at 2 kHz, effects, noise and slightly wrong nominal
 parameters of its own), and each record has conditions of its own: four rigs, drives

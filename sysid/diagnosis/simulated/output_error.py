@@ -85,7 +85,8 @@ class OutputProblem(Problem):
         speed v is uncertain by u = `CYCLE_S` |v| and weighs w = 1 / √(1 + (u / s)²),
         with the largest |v| of three samples about it: a fast servo starts between two.
         What others push is known as well as rows sample their motion and as none of
-        them is missing: `JointTrack.pushed`, u, may move this joint by u / kp more.
+        them is missing: `JointTrack.pushed`, u, may move this joint by u / kp more. And
+        between its rows the angle itself is known as well as they show its motion.
 
         Args:
             raw: errors of one candidate, without weights [rad].
@@ -99,13 +100,19 @@ class OutputProblem(Problem):
         valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
         speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
         late = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
-        unsure = np.hypot(late, self._pushed()[rows])
+        timed, between = np.hypot(late, self._pushed()[rows]), self._unread()[rows]
+        unsure = np.hypot(timed, between)
         if self.repeat:
             series, counts = self.repeat.differences(raw[1], valid)
             size = bulk_deviation(series[counts]) if counts.any() else 1.0
+            alike = 1.0 / np.hypot(1.0, timed / size)
             weight = 1.0 / np.hypot(1.0, unsure / size)
-            found = self.repeat.differences(weight * raw[1], valid)
-            noise = autoregressive(*found)
+            # Repeats jitter each in its own way: a weight of both for their difference.
+            apart = self.repeat.differences(between**2, valid)[0] / np.sqrt(2.0)
+            both = np.sqrt(np.maximum(between**2 - apart, 0.0))
+            shared = 1.0 / np.hypot(1.0, np.hypot(timed, both) / size) / alike
+            series, counts = self.repeat.differences(alike * raw[1], valid)
+            noise = autoregressive(shared * series, counts)
         else:
             readings = np.array([self.reading_noise**2, 0.0, 0.0])
             size = difference_noise(raw[1], valid, readings, band_steps=0.0)
@@ -118,6 +125,12 @@ class OutputProblem(Problem):
         """Returns how far pushes of others, as sampled, may lead the angle astray."""
         kp = np.asarray(self.data.track.kp, float)
         return self.data.pushed / np.maximum(kp, 1e-12)
+
+    def _unread(self) -> Float[np.ndarray, "t p"]:
+        """Returns what smoothing leaves of the error between rows, √(Σ_k w_k² u_k²)."""
+        squares = self.data.unread**2
+        parts = [np.convolve(u, FINE_TAPS**2, "same") for u in squares.T]
+        return np.sqrt(np.stack(parts, 1))
 
     def with_remaining(self, raw: Float[np.ndarray, "2 m p"]) -> "OutputProblem":
         """Takes what a model leaves as noise: s'² = max(s_y², τ mean r²).
