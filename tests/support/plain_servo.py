@@ -22,6 +22,12 @@ def still(t_s):
     return 0.0 * t_s
 
 
+def steps_taken(t_s):
+    """Steps of 0.3 rad a second, as taken by a critically damped servo of 60 rad/s."""
+    since = t_s % 1.0
+    return 0.3 * np.floor(t_s) - 0.3 * (1.0 + 60.0 * since) * np.exp(-60.0 * since)
+
+
 def servo(cmd, row_s, late_s=0.0, push=still, dt=0.0001):
     """Angles and torques of a servo without low-pass: read, then the target is sent."""
     q = v = 0.0

@@ -69,7 +69,7 @@ class Piece:
         every: readings in a step.
         row_s: time between two readings [s].
         pos: encoder angle, smoothed.
-        unsure: how far that angle may err where it was not read, before smoothing; not
+        unread: how far that angle may err where it was not read, before smoothing; not
             of a slow log, which is looked at in its rows.
         vel, acc: first and second derivative of `pos`.
         effort: effort in the unit of its column, smoothed; NaN if not logged.
@@ -87,7 +87,7 @@ class Piece:
     every: int
     row_s: float
     pos: Float[np.ndarray, "n j"]
-    unsure: Float[np.ndarray, "n j"]
+    unread: Float[np.ndarray, "n j"]
     vel: Float[np.ndarray, "n j"]
     acc: Float[np.ndarray, "n j"]
     effort: Float[np.ndarray, "n j"]
@@ -194,7 +194,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
     fine = start + fine_s * np.arange(int((stop - start) / step_s) * every + 1)
     columns, valid, silences = {}, np.ones(len(fine), bool), []
     held = sent = np.zeros((len(fine), 1))
-    unsure = np.zeros(len(fine[::every]))
+    unread = np.zeros(len(fine[::every]))
     for key, name in names.items():
         t_s, values = _once(*log.samples(name))
         inside = (t_s >= start - MAX_FILL_S) & (t_s <= stop + MAX_FILL_S)
@@ -210,7 +210,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
             columns[key] = read_between(t_s, values, fine, period)
             valid &= _near(t_s, fine, LOST * period)
             if key == "pos" and step_s > 0.5 * period:  # else rows are steps of it
-                unsure = error_between(t_s, values, fine[::every], period)
+                unread = error_between(t_s, values, fine[::every], period)
     resumed = np.zeros(len(fine[::every]), bool)
     for since, back, until in silences:
         valid &= (fine <= since) | (fine >= until)
@@ -225,7 +225,7 @@ def _joint(log, joint, drive, start, stop, step_s, every) -> dict | None:
         "held": held,
         "sent": sent,
         "pos": smooth["pos"],
-        "unsure": unsure,
+        "unread": unread,
         "vel": slope[0] / fine_s,
         "acc": slope[1] / fine_s**2,
         "effort": smooth.get("effort", none),

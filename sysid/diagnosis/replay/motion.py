@@ -93,7 +93,7 @@ class JointTrack:
         uncertainty: of both residuals beyond their usual noise; see
             `timing_uncertainty` [N·m] (2, m, p).
         pushed: of what other joints push, as sampled and read [N·m] (t, p).
-        unread: of the angle, where it was not read, before smoothing [rad] (t, p).
+        unread: how far the angle may err between its rows; see `Piece` [rad] (t, p).
         other: joint whose angle and effort are in the track; its own without others.
         neighbours: angle and effort (2, t, p) of every joint that may pull on it.
         armature: part of the inertia that the model gives to the drive [kg·m²].

@@ -189,7 +189,7 @@ def _track(one: _Joint) -> JointTrack:
         moving=np.abs(fields["slow_vel"])[rows] > at_rest,
         uncertainty=residual_uncertainty(fields, drive, step_s)[:, rows],
         pushed=push_uncertainty(fields["push"], one.others_read(), step_s),
-        unread=one.column("unsure"),
+        unread=one.column("unread"),
         other=other,
         neighbours=pulls,
         armature=float(one.mechanism.model.dof_armature[dof]),

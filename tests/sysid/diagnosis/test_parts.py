@@ -6,6 +6,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.signal import lfilter
+from support.plain_servo import steps_taken
 
 from benchmarks.diagnosis.hidden.believed import believed
 from benchmarks.diagnosis.hidden.cases import draw_case
@@ -70,18 +71,12 @@ def test_rows_that_jitter_are_read_between_on_a_curve():
     assert error < 1e-5 < 2e-3 < np.abs(np.interp(grid, t_s, wave) - truth).max()
 
 
-def servo_steps(t_s):
-    """Moves of 0.3 rad every second, each as of a servo that lags by a fifteenth."""
-    since = t_s % 1.0
-    return 0.3 * np.floor(t_s) - 0.3 * (1.0 + 60.0 * since) * np.exp(-60.0 * since)
-
-
 def test_the_error_between_rows_is_known_where_a_servo_takes_a_step():
     rng = np.random.default_rng(0)
     t_s = 0.02 * np.arange(3000) + rng.uniform(-4e-3, 4e-3, 3000)
     grid = 0.02 * np.arange(5, 2995)
-    error = np.abs(read_between(t_s, servo_steps(t_s), grid, 0.02) - servo_steps(grid))
-    said = error_between(t_s, servo_steps(t_s), grid, 0.02)
+    error = np.abs(read_between(t_s, steps_taken(t_s), grid, 0.02) - steps_taken(grid))
+    said = error_between(t_s, steps_taken(t_s), grid, 0.02)
     large = error > 1e-3
     assert large.sum() > 50
     ratio = np.sqrt(np.mean(said[large] ** 2) / np.mean(error[large] ** 2))
@@ -97,7 +92,7 @@ def test_between_rows_of_a_smooth_motion_hardly_anything_is_lost():
 
 def test_at_the_rows_themselves_nothing_is_lost():
     t_s = 0.02 * np.arange(300)
-    assert not error_between(t_s, servo_steps(t_s), t_s, 0.02).any()
+    assert not error_between(t_s, steps_taken(t_s), t_s, 0.02).any()
 
 
 def test_a_gap_is_bridged_by_a_straight_line():

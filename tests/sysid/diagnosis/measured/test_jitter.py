@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from support.plain_servo import ARM, problem_with
+from support.plain_servo import ARM, problem_with, steps_taken
 
 from benchmarks.diagnosis.battery import run_task
 from benchmarks.diagnosis.plan import wide_plan
@@ -26,10 +26,8 @@ def test_the_angle_is_unsure_between_rows_that_jitter(row_s, jitter, low, high):
     rows = np.arange(400)
     late = np.random.default_rng(0).uniform(-jitter, jitter, len(rows))
     t_s = row_s * (rows + late)
-    steps = 0.3 * np.floor(t_s % 2.0)
-    since = t_s % 1.0
-    angle = steps + (0.3 - 2.0 * steps) * np.exp(-60.0 * since) * (1.0 + 60.0 * since)
-    log = make_log(("servo",), t_s, {"cmd.servo": steps, "pos.servo": angle})
+    columns = {"cmd.servo": 0.3 * np.floor(t_s), "pos.servo": steps_taken(t_s)}
+    log = make_log(("servo",), t_s, columns)
     drive = JointDrive(Nominal(24.0), Nominal(0.7))
     mechanism = model_mechanism(mujoco.MjModel.from_xml_string(ARM), {"servo": drive})
     unread = all_tracks([log], mechanism)[0].unread
@@ -53,7 +51,7 @@ def test_a_sample_between_rows_weighs_less_by_what_they_do_not_show():
 @pytest.mark.slow
 @pytest.mark.parametrize("number", [305, 444])
 def test_a_step_within_three_rows_is_not_unexplained(number):
-    """Nothing is hidden; at 50 Hz the curve errs by 5 mrad, 20 times the noise."""
+    """Nothing is hidden; at 50 Hz the curve errs by milliradians there."""
     assert run_task(wide_plan(694322, [number])[0]).verdict in (
         "none",
         "not_observable",
