@@ -11,7 +11,11 @@ prefers.
 
 from dataclasses import dataclass
 
-from sysid.diagnosis.fits.candidate import Model, likelihood_gap
+from sysid.diagnosis.fits.candidate import (
+    Model,
+    likelihood_gap,
+    log_likelihood_gain,
+)
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.contained import plainer
@@ -96,6 +100,12 @@ def _by_angle(judge: Judge, worse: Model, better: Model) -> float:
 
 
 def _ahead(judge: Judge, best: Model, other: Model) -> float:
-    """How much likelier another model is by angle than less so by equations [nat]."""
+    """How much likelier another model is by angle than less so by equations [nat].
+
+    By the angles that a fit saw as well as by those that it did not: of two effects
+    with folds that hardly predict each other, chance decides what is held out.
+    """
     behind = likelihood_gap(other, best, judge.problem.samples)
-    return _by_angle(judge, best, other) - max(0.0, behind)
+    samples = judge.output.samples
+    fitted = log_likelihood_gain(nearest(judge, best), nearest(judge, other), samples)
+    return min(fitted, _by_angle(judge, best, other)) - max(0.0, behind)
