@@ -1,4 +1,4 @@
-"""Fits of one effect alone: nothing else may take up what it does."""
+"""Fits of one effect alone, or beside what is named: no other takes up what it does."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,13 +14,16 @@ Sets = Sequence[tuple[str, ...]]
 Thetas = Sequence[Float[np.ndarray, " n"]]
 
 
-def fitted_alone(problem: Problem, sets: Sets, starts: Thetas) -> list[np.ndarray]:
-    """θ̂_e = argmin ‖r(θ)‖² over the last effect e of each set; all else stays.
+def fitted_alone(
+    problem: Problem, sets: Sets, starts: Thetas, beside: Sequence[int] = ()
+) -> list[np.ndarray]:
+    """θ̂_e = argmin ‖r(θ)‖² over the last effect e of each set; the rest stays.
 
     Args:
         problem: residuals of a joint.
         sets: released effects of every model.
         starts: first coordinates of every model [1].
+        beside: indices of coordinates that may change with it; none by default.
 
     Returns:
         The coordinates of every model.
@@ -32,7 +35,7 @@ def fitted_alone(problem: Problem, sets: Sets, starts: Thetas) -> list[np.ndarra
         replace(
             task_of(problem, effects, start),
             start=start,
-            free=np.array(problem.space.of(effects[-1])),
+            free=np.array(sorted({*problem.space.of(effects[-1]), *beside})),
         )
         for effects, start in zip(sets, starts, strict=True)
     ]

@@ -7,7 +7,7 @@ The parameters θ̂_{−g} without fold g are `heldout`'s.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import jax.numpy as jnp
 import numpy as np
@@ -99,6 +99,23 @@ def likelihood_gap(candidate: Model, best: Model, samples: int) -> float:
     share = (candidate.score - best.score) / (count * best.variance(samples))
     behind = 0.5 * count * float(np.log1p(share)) if np.isfinite(share) else np.inf
     return behind + candidate.noise_cost - best.noise_cost
+
+
+def fitted_gap(candidate: Model, best: Model, samples: int) -> float:
+    """How far a candidate is behind on the data that were fitted: C for S.
+
+    The formula of `likelihood_gap` with the costs C on all data.
+
+    Args:
+        candidate: the model that may be behind; negative if it is ahead.
+        best: the other.
+        samples: n, number of residuals that count.
+
+    Source:
+        Ours.
+    """
+    behind, ahead = (replace(m, score=m.fit.cost) for m in (candidate, best))
+    return likelihood_gap(behind, ahead, samples)
 
 
 def heldout_gain(worse: Model, better: Model, samples: int) -> float:

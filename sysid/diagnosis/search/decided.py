@@ -4,18 +4,15 @@ An equation of means over steps explains a torque with whatever is large at the 
 time; the motion that follows from it need not be that which was measured. Where one
 cause was found, another effect takes its place if the angle with it is more likely by
 more than the equations are less so, by a share of what the cause explains of the angle:
-no simulation is exact. Asked are effects that explain about as much of the equations;
-and where these show less of the cause than the angle does, those that the angle
-prefers.
+no simulation is exact. That must hold for the angles that a fit saw as well as for
+those that it did not: where folds hardly predict each other, chance decides what is
+held out. Asked are effects that explain about as much of the equations; and where these
+show less of the cause than the angle does, those that the angle prefers.
 """
 
 from dataclasses import dataclass
 
-from sysid.diagnosis.fits.candidate import (
-    Model,
-    likelihood_gap,
-    log_likelihood_gain,
-)
+from sysid.diagnosis.fits.candidate import Model, fitted_gap, likelihood_gap
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.search.by_angle import nearest
 from sysid.diagnosis.search.contained import plainer
@@ -56,16 +53,18 @@ def decided_by_angle(
         return None
     asked = _asked(judge, base, best, others)
     gain = _by_angle(judge, base, best)
-    ahead = {m.effects: _ahead(judge, best, m) for m in asked}
+    behind = {m.effects: _behind(judge, best, m) for m in asked}
+    ahead = {m.effects: _by_angle(judge, best, m) - behind[m.effects] for m in asked}
     for m in sorted(asked, key=lambda m: -ahead[m.effects]):
         needed = threshold_of(judge.problem, m, m.effects)
         least = max(needed, NESTED_SHARE * gain)
         if ahead[m.effects] <= least or not judge.confirms(base, m):
             continue
-        lead = ahead.pop(m.effects)
+        asked = [o for o in asked if o is not m]
         if plainer(judge, base, m, others) is None:
-            leads = {e: lead - by for e, by in ahead.items()}
-            leads |= {best.effects: lead, (): _by_angle(judge, base, m)}
+            more = {o.effects: behind[o.effects] - behind[m.effects] for o in asked}
+            leads = {o.effects: _by_angle(judge, o, m) + more[o.effects] for o in asked}
+            leads |= {best.effects: ahead[m.effects], (): _by_angle(judge, base, m)}
             return Decided(m, leads)
     return None
 
@@ -94,18 +93,12 @@ def _may_stand(problem: Problem, base: Model, model: Model, cause: str) -> bool:
 
 
 def _by_angle(judge: Judge, worse: Model, better: Model) -> float:
-    """How much likelier the angle is with a model [nat]."""
+    """How much likelier the angle is with a model, fitted and held out [nat]."""
     fits = nearest(judge, worse), nearest(judge, better)
-    return likelihood_gap(*fits, judge.output.samples)
-
-
-def _ahead(judge: Judge, best: Model, other: Model) -> float:
-    """How much likelier another model is by angle than less so by equations [nat].
-
-    By the angles that a fit saw as well as by those that it did not: of two effects
-    with folds that hardly predict each other, chance decides what is held out.
-    """
-    behind = likelihood_gap(other, best, judge.problem.samples)
     samples = judge.output.samples
-    fitted = log_likelihood_gain(nearest(judge, best), nearest(judge, other), samples)
-    return min(fitted, _by_angle(judge, best, other)) - max(0.0, behind)
+    return min(likelihood_gap(*fits, samples), fitted_gap(*fits, samples))
+
+
+def _behind(judge: Judge, best: Model, other: Model) -> float:
+    """How much less likely another model is by equations [nat]."""
+    return max(0.0, likelihood_gap(other, best, judge.problem.samples))

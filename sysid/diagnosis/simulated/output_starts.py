@@ -24,6 +24,7 @@ from sysid.diagnosis.fits.starts import (
 )
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.simulated.play import NAME as PLAY
+from sysid.diagnosis.simulated.torque_scales import at_every_scale
 
 EQUATIONS_TRIED = 3
 """Number of candidates of a stage that are fitted to the angle as the equations say."""
@@ -58,7 +59,8 @@ def output_starts(
     nearest if the nuisance parameters follow: alone beside those that have taken up a
     part of it, as gains take up play, an effect shrinks to nothing. A joint crosses a
     large play freely: hills lie between its sizes, and beside gains that stand for it
-    the nearest size may be none, so where much is left it is fitted from each.
+    the nearest size may be none, so where much is left it is fitted from each. And
+    where no gain is known, beside gains of several sizes (`torque_scales`).
 
     Args:
         problem: the error of the angle.
@@ -81,6 +83,7 @@ def output_starts(
     starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
     starts += _followed(problem, smaller, proposed)
     starts += _of_every_size(problem, smaller, proposed)
+    starts += at_every_scale(problem, smaller, proposed, ALONE_TRIED)
     return starts + _with_others_back(problem, smaller, proposed)
 
 

@@ -59,15 +59,15 @@ def implausible(monkeypatch):
     def gap(candidate, best, samples):
         return getattr(best, samples) - getattr(candidate, samples)
 
-    def gain(worse, better, samples):
+    def fitted(candidate, best, samples):
         assert samples == "angle"
-        return min(better.angle - worse.angle, better.fitted - worse.fitted)
+        return best.fitted - candidate.fitted
 
     def plausible(problem, smaller, larger):
         return larger.effects[0] not in names
 
     monkeypatch.setattr(decided, "likelihood_gap", gap)
-    monkeypatch.setattr(decided, "log_likelihood_gain", gain)
+    monkeypatch.setattr(decided, "fitted_gap", fitted)
     monkeypatch.setattr(decided, "plausible", plausible)
     monkeypatch.setattr(decided, "threshold_of", lambda *args: 12.0)
     monkeypatch.setattr(decided, "nearest", lambda judge, m: judge.moved(m))
@@ -95,6 +95,15 @@ def test_what_the_angle_prefers_by_more_takes_the_place(monkeypatch):
     # By angle, less what it is behind in the equations, of each.
     leads = {("payload_com",): 293.0, ("stiffness",): 251.0}
     assert said.leads == leads | {(): 600.0}
+
+
+def test_a_lead_is_the_smaller_of_both(monkeypatch):
+    """Held out 250 nat, fitted 230; both less what it is behind in the equations."""
+    others = [model("stiffness", 9.0, 350.0, fitted=370.0), COUPLED]
+    said = decide(monkeypatch, LOAD, others)
+    assert said is not None
+    assert said.best is COUPLED
+    assert said.leads[("stiffness",)] == 230.0 + 8.0 - 7.0
 
 
 @pytest.mark.parametrize(

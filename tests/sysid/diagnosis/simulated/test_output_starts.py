@@ -20,6 +20,7 @@ from sysid.diagnosis.simulated.output_starts import (
     output_starts,
 )
 from sysid.diagnosis.simulated.settled_output import settled_output
+from sysid.diagnosis.simulated.torque_scales import unknown_gains
 
 
 def scales(problem, theta):
@@ -59,7 +60,7 @@ def test_a_candidate_begins_at_two_places(unknown):
     far = problem.space.nominal.copy()
     far[index] = problem.space.slots[index].coordinate(0.01)
     proposed = fit_models(problem, [("encoder_offset",)], [far], rounds=0)
-    (_, near), (effects, alone) = output_starts(problem, base, proposed)
+    (_, near), (effects, alone), (_, scaled) = output_starts(problem, base, proposed)
     assert effects == ("encoder_offset",)
     # Near: the offset fitted, all else as in the smaller model.
     assert near[index] != far[index]
@@ -67,6 +68,10 @@ def test_a_candidate_begins_at_two_places(unknown):
     # Alone: fitted, all else at nominal.
     assert alone[index] != far[index]
     np.testing.assert_array_equal(alone[others], problem.space.nominal[others])
+    # And, of gains that nobody knows, fitted with them.
+    others[unknown_gains(problem.space)] = False
+    np.testing.assert_array_equal(scaled[others], problem.space.nominal[others])
+    assert scales(problem, scaled) == pytest.approx((1.0 / 3.0, 1.0 / 0.4), rel=0.1)
 
 
 def test_an_effect_that_shrinks_beside_what_took_its_place_is_tried(unknown):
@@ -153,7 +158,9 @@ def test_what_comes_near_alone_is_tried_whatever_the_equations_say(unknown):
     tried = list(dict.fromkeys(e for e, _ in output_starts(problem, nominal, proposed)))
     assert tried[:EQUATIONS_TRIED] == sets[:EQUATIONS_TRIED]
     assert ("stiffness",) in tried  # three times too stiff
-    assert len(tried) <= EQUATIONS_TRIED + 2 * ALONE_TRIED < len(sets)
+    # By the equations, alone at nominal and beside the smaller model, along secants and
+    # beside gains of every size.
+    assert len(tried) <= EQUATIONS_TRIED + 4 * ALONE_TRIED < len(sets)
 
 
 def test_what_left_its_tolerance_may_stand_for_the_effect_and_is_put_back(unknown):
