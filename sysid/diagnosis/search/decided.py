@@ -30,8 +30,9 @@ class Decided:
 
     Attributes:
         best: the model.
-        leads: how much likelier it is than others by angle, less what it is less likely
-            by equations, by their effects; () for none, by angle alone [nat].
+        leads: how much likelier it is than others by angle, fitted or held out,
+            whichever says less, less what it is less likely by equations; by their
+            effects, () for none, by angle alone [nat].
     """
 
     best: Model
