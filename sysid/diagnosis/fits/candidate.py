@@ -102,9 +102,9 @@ def likelihood_gap(candidate: Model, best: Model, samples: int) -> float:
 
 
 def fitted_gap(candidate: Model, best: Model, samples: int) -> float:
-    """How far a candidate is behind on the data that were fitted: C for S.
+    """How far a candidate is behind another in its fit to all data.
 
-    The formula of `likelihood_gap` with the costs C on all data.
+    The formula of `likelihood_gap` with the costs C of the fits in the place of S.
 
     Args:
         candidate: the model that may be behind; negative if it is ahead.

@@ -54,6 +54,7 @@ def at_every_scale(
     ]
     if not begin:
         return []
+    # Slopes of the smaller model, by which `best_starts` ranks, do not hold so far off.
     errors = costs(problem, [e for _, e, _ in begin], [u for *_, u in begin])
     best: dict[tuple[int, tuple[str, ...]], int] = {}
     for k in np.argsort(errors).tolist():
@@ -105,9 +106,7 @@ def origins_of(
     """
     slots = [problem.space.slots[i] for i in gains]
     low, high = ([getattr(s, end) for s in slots] for end in ("low", "high"))
-    fitted, origins = smaller.fit.theta[gains], []
-    for scale in SCALES:
-        origin = near_nominal(problem, smaller)
-        origin[gains] = np.clip(scale + fitted - fitted[0], low, high)
-        origins.append(origin)
-    return origins
+    apart = smaller.fit.theta[gains] - smaller.fit.theta[gains[0]]
+    origins = np.tile(near_nominal(problem, smaller), (len(SCALES), 1))
+    origins[:, gains] = np.clip(np.add.outer(SCALES, apart), low, high)
+    return list(origins)
