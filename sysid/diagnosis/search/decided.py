@@ -61,7 +61,7 @@ def decided_by_angle(
         least = max(needed, NESTED_SHARE * gain)
         if ahead[m.effects] <= least or not judge.confirms(base, m):
             continue
-        # What contains another, and shows no more than that, is no rival of it either.
+        # What contains another, and shows no more than that, is no alternative either.
         asked = [o for o in asked if o is not m]
         if plainer(judge, base, m, others) is None:
             more = {o.effects: behind[o.effects] - behind[m.effects] for o in asked}
