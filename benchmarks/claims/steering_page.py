@@ -8,11 +8,13 @@ from pathlib import Path
 
 from envs.config.atomic_file import write_atomic
 
-RESULTS = Path("benchmarks/results/steering_walker")
+RESULTS = Path("benchmarks/results/steering_planted")
+WALKER = Path("benchmarks/results/steering_walker/crawl.json")
 PAGE = Path("docs/results/steering.md")
 FIGURE = Path("docs/images/steering.png")
-TAKEN, FAST = "steering-0-gain-4", "crawl"
-MEMBERS = ("steering-0", "steering-1", "strong-0", "strong-1")
+TAKEN, FAST = "planted_more-1-steer", "crawl"
+OTHER_GAIN = "planted_more-1-steer-gain-1"
+MEMBERS = ("planted-0", "planted-1", "planted_more-0", "planted_more-1")
 TURNS = ([0.1, 0.0, 0.45], [0.1, 0.0, -0.45], [0.0, 0.0, 0.45], [0.0, 0.0, -0.45])
 FORWARD = [0.16, 0.0, 0.0]
 
@@ -31,8 +33,8 @@ means with 95 % intervals over episodes.
 {commands}
 
 v_x, v_y and path speed in m/s, turn rates in rad/s. The policy that walks fast turns as
-its gait does, whatever it is asked; the one that steers obeys, but stands when it is
-asked to go to the right sideways.
+its gait does, whatever it is asked; the one that steers obeys. To the right sideways it
+goes half as fast as it is asked, and drifts forward.
 
 ## Every member of the population
 
@@ -62,11 +64,17 @@ python -m benchmarks.claims.steering_page
 """
 
 
+def read() -> dict[str, dict]:
+    """Returns, by name, what `fingers steer --json` wrote of each policy."""
+    files = [*RESULTS.glob("*-steer*.json"), WALKER]
+    return {path.stem: json.loads(path.read_text("utf-8")) for path in files}
+
+
 def page(results: dict[str, dict]) -> str:
     """Returns the page in Markdown.
 
     Args:
-        results: by name, what `fingers steer --json` wrote.
+        results: what `read` returns.
     """
     tables = {"commands": _commands, "members": _members, "headings": _headings}
     return TEXT.format(**{k: "\n".join(f(results)) for k, f in tables.items()})
@@ -95,8 +103,9 @@ def _members(results: dict[str, dict]) -> list[str]:
         "|---|---|---|---|---|---|",
     ]
     for name in MEMBERS:
-        found = [_row(results[name], turn)["turn_rate_rad_s"] for turn in TURNS]
-        speed = _row(results[name], FORWARD)["path_speed_mps"]
+        result = results[f"{name}-steer"]
+        found = [_row(result, turn)["turn_rate_rad_s"] for turn in TURNS]
+        speed = _row(result, FORWARD)["path_speed_mps"]
         cells = " | ".join(_interval(one) for one in [*found, speed])
         lines.append(f"| `{name}` | {cells} |")
     return lines
@@ -109,7 +118,7 @@ def _headings(results: dict[str, dict]) -> list[str]:
         "walks fast, gain 4 | settled |",
         "|---|---|---|---|---|---|---|",
     ]
-    three = [results[name]["headings"] for name in (TAKEN, "steering-0", FAST)]
+    three = [results[name]["headings"] for name in (TAKEN, OTHER_GAIN, FAST)]
     for rows in zip(*three, strict=True):
         cells = [
             f"{row['error_deg']['mean']:.1f}° | {row['settled']['mean']:.2f}"
@@ -162,8 +171,8 @@ def draw(results: dict[str, dict], path: Path) -> None:
 
 
 def main() -> None:
-    """Reads every result and writes page and figure."""
-    results = {p.stem: json.loads(p.read_text("utf-8")) for p in RESULTS.glob("*.json")}
+    """Writes page and figure."""
+    results = read()
     draw(results, FIGURE)
     write_atomic(PAGE, page(results).encode())
 

@@ -31,6 +31,7 @@ MEMBERS = {
     "steering_long": (2, 1),
     "steering_speed": (2, 2),
     "steering_planted": (2, 2),
+    "steering_task_speed": (2, 2),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }
