@@ -105,6 +105,7 @@ def servo(known, share, tolerance, effects):
 
 @real
 @pytest.mark.slow
+@pytest.mark.timeout(3600)  # all records at once
 def test_xl330_gain_is_half_of_the_manual():
     full = {"torque_limit": {"limit_nm": Nominal(STALL_NM, 0.01)}}
     logs = load_xl330(Path(REAL) / "bam_xl330" / "raw")
@@ -118,6 +119,7 @@ def test_xl330_gain_is_half_of_the_manual():
 
 @real
 @pytest.mark.slow
+@pytest.mark.timeout(3600)  # all records at once
 def test_xl330_load_friction_and_limit():
     """Every gain is predicted from the others: 102 to 48 mrad in closed loop."""
     free = {
