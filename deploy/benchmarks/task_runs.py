@@ -36,6 +36,7 @@ from fingers_robot.behaviour.upright import tilt_angle
 from fingers_robot.safety import Mode, Operator
 
 POLICIES = WALKING.parent
+TASKS = ("keyboard", "push", "recovery", "stop")
 CAMERA_S, LATE_S, CONTROL_S = 1 / 60, 0.04, 0.02
 ENTER_M = 0.02
 EVERY_FALL = 6
@@ -232,21 +233,19 @@ def main() -> int:
     """Runs the measurement and prints it as JSON."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--trials", type=int, default=5)
+    parser.add_argument("--tasks", nargs="+", choices=TASKS, default=list(TASKS))
     options = parser.parse_args()
+    falls = range(0, len(load_falls(held_out=True).side), EVERY_FALL)
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        keys = ARROWS * 2
-        results = {
-            "keyboard": [type_keys(folder, keys, k) for k in range(options.trials)],
-            "push": [push_cube(folder, k) for k in range(options.trials)],
-            "recovery": [
-                get_up(folder, k)
-                for k in range(0, len(load_falls(held_out=True).side), EVERY_FALL)
-            ],
-            "stop at full speed": [
-                stop_walking(folder, wait_s, STOPS) for wait_s in (0.0, 0.5)
-            ],
+        keys, trials = ARROWS * 2, range(options.trials)
+        runs = {
+            "keyboard": lambda: [type_keys(folder, keys, k) for k in trials],
+            "push": lambda: [push_cube(folder, k) for k in trials],
+            "recovery": lambda: [get_up(folder, k) for k in falls],
+            "stop": lambda: [stop_walking(folder, w, STOPS) for w in (0.0, 0.5)],
         }
+        results = {task: runs[task]() for task in options.tasks}
     print(json.dumps(results, indent=1))
     return 0
 

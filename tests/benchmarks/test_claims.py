@@ -32,6 +32,7 @@ MEMBERS = {
     "steering_speed": (2, 2),
     "steering_planted": (2, 2),
     "steering_task_speed": (2, 2),
+    "steering_all_dearer": (2, 2),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }

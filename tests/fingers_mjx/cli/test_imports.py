@@ -224,8 +224,8 @@ def test_settings_that_name_rewards_need_their_tables_and_no_simulator():
     lines, status, said, loaded = printed("play", f"{policy}", "--dry-run")
     assert (status, said) == (0, "") and set(loaded) <= {"numpy", "jax", "flax"}
     assert "height_m: 0.0" in map(str.strip, lines)
-    others = "support: 5.0, slide: -10.0, approach: -12.0, shear: -20.0"
-    assert f"weights: {{{others}, drift: -1000.0}}" in map(str.strip, lines)
+    others = "support: 5.0, slide: -10.0, approach: -12.0, drift: -2000.0"
+    assert f"weights: {{{others}, shear: -20.0}}" in map(str.strip, lines)
 
 
 @pytest.mark.parametrize("command", ["eval", "play"])
