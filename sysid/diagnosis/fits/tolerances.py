@@ -5,6 +5,7 @@ from dataclasses import replace
 from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
 from sysid.diagnosis.fits.parameters import Slot, Space
 from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.refolded import refolded
 from sysid.diagnosis.fits.space import SIGMA
 
 
@@ -17,7 +18,9 @@ def within_tolerances(problem: Problem, model: Model) -> Model:
     """
     slots = [_within(s, model.effects) for s in problem.space.slots]
     bounded = replace(problem, space=Space(tuple(slots)))
-    return fit_models(bounded, [model.effects], [model.fit.theta], rounds=CONVERGED)[0]
+    starts = [model.fit.theta]
+    fit = fit_models(bounded, [model.effects], starts, rounds=CONVERGED)[0]
+    return refolded(bounded, fit)
 
 
 def _within(slot: Slot, effects: tuple[str, ...]) -> Slot:

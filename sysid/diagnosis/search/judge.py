@@ -14,10 +14,11 @@ its blocks,
 must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
 parameter that leaves its tolerance. And it must matter: the root mean square of the
 error must fall by the share `LEAST_FALL`, or from clearly more than noise to about
-that. Gains of a servo that nobody knows are, with and without the effect, those that
-the logged effort shows to that model, as surely as it does: free ones would do in the
-simulation what the effect does. The likelihood need not gain where
-the logged effort has no other explanation: what parameters a little out of their
+that. Gains of a servo that nobody knows are those that the logged effort shows to that
+model, as surely as it does: free ones would do in the simulation what the effect does.
+Without the effect they may be those that it shows beside the effect, too, whichever
+come nearer: what a gain does is no work of the effect. The likelihood need not gain
+where the logged effort has no other explanation: what parameters a little out of their
 tolerances hide of the angle, as a servo's damping hides friction, they do not hide of
 the effort, whose error then must fall by `LEAST_FALL_OF_EFFORT`. An angle
 that does not show the cause need not come nearer by `LEVEL` either, which chance would
@@ -37,15 +38,16 @@ from sysid.diagnosis.fits.candidate import (
     fit_models,
     log_likelihood_gain,
 )
-from sysid.diagnosis.fits.intervals import standard_errors
+from sysid.diagnosis.fits.nested import nearer_without
 from sysid.diagnosis.fits.origins import at_nominal
-from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.fits.problem import Problem
-from sysid.diagnosis.fits.space import SIGMA
+from sysid.diagnosis.fits.refolded import refolded
 from sysid.diagnosis.fits.tolerances import within_tolerances
+from sysid.diagnosis.likelihood.predictive_accuracy import t_of_blocks
 from sysid.diagnosis.replay.band import EVERY, sample_rows
 from sysid.diagnosis.search.remains import LEFT, becomes_noise, explains_effort
 from sysid.diagnosis.search.selection import NOMINAL_THRESHOLD
+from sysid.diagnosis.search.shown_gains import shown_gains
 from sysid.diagnosis.simulated.closed_loop import simulated
 from sysid.diagnosis.simulated.output_error import OutputProblem, output_error
 from sysid.diagnosis.simulated.settled_output import settled_output
@@ -67,15 +69,12 @@ right causes that a quarter of the root refused.
 LEAST_FALL_OF_EFFORT = 0.25
 """The same of the effort's error: it crosses a line of noise when it falls by less."""
 
-GAIN_TOLERANCE = 0.05
-"""Least tolerance of gains that the effort shows [1]."""
-
 TRIED = 5
 """Number of candidates of a stage that are judged, best first."""
 
 
 class Judge:
-    """Compares simulations of one joint; each model is fitted and simulated once.
+    """Compares simulations of one joint, and keeps fits and errors of its models.
 
     Args:
         problem: to whose residuals models are fitted.
@@ -89,6 +88,7 @@ class Judge:
         self.bounded: dict[int, tuple[Model, Model]] = {}
         self.fits: dict[int, tuple[Model, Model]] = {}
         self.served: dict[int, tuple[Model, Judge]] = {}
+        self.pairs: dict[tuple[int, ...], tuple[tuple, tuple[Model, Model]]] = {}
 
     @property
     def sees(self) -> bool:
@@ -107,7 +107,7 @@ class Judge:
         if output is None:
             return self.problem
         output, fit = settled_output(output, self.base)
-        self.fits[id(self.base)] = (self.base, fit)
+        self.fits[id(self.base)] = (self.base, refolded(output, fit))
         return output
 
     def serving(self, model: Model) -> "Judge":
@@ -117,46 +117,33 @@ class Judge:
             model: fitted to the equations; itself, where its gains are known or the
                 angle alone was fitted.
         """
-        gains = self._unknown_gains()
-        if not gains or self.output is self.problem:
+        if self.output is self.problem:
             return self
         if id(model) not in self.served:
-            slots = list(self.problem.space.slots)
-            sigma = standard_errors(self.problem, model, self.problem.samples)
-            for i in gains:
-                shown, sd = float(model.fit.theta[i]), SIGMA * GAIN_TOLERANCE
-                sd = max(sd, float(sigma[i]))
-                slots[i] = replace(slots[i], nominal=shown, prior_sd=sd)
-            space = Space(tuple(slots))
-            judge = Judge(replace(self.problem, space=space), self.base)
-            judge.output = replace(self.output, space=space)
+            space, judge = shown_gains(self.problem, model), self
+            if space is not self.problem.space:
+                judge = Judge(replace(self.problem, space=space), self.base)
+                judge.output = replace(self.output, space=space)
             self.served[id(model)] = (model, judge)
         return self.served[id(model)][1]
 
-    def _unknown_gains(self) -> list[int]:
-        """Returns the coordinates of gains that are free, if the effort shows them."""
-        if not self.problem.data.effort.all():
-            return []
-        space = self.problem.space
-        found = [i for e in ("stiffness", "damping") for i in space.of(e)]
-        return [i for i in found if np.isinf(space.slots[i].prior_sd)]
-
     def moved(self, model: Model) -> Model:
         """Returns a model of the equations fitted to the angle."""
-        output = self.output
-        if output is self.problem:
-            return model
+        output, fit = self.output, model
         if id(model) not in self.fits:
-            starts = [model.fit.theta, at_nominal(output, model)]
-            sets = [model.effects] * len(starts)
-            fits = fit_models(output, sets, starts, rounds=CONVERGED)
-            self.fits[id(model)] = (model, min(fits, key=lambda m: m.fit.cost))
+            if output is not self.problem:
+                starts = [model.fit.theta, at_nominal(output, model)]
+                sets = [model.effects] * len(starts)
+                fits = fit_models(output, sets, starts, rounds=CONVERGED)
+                fit = min(fits, key=lambda m: m.fit.cost)
+            self.fits[id(model)] = (model, refolded(output, fit))
         return self.fits[id(model)][1]
 
     def knows(self, model: Model, fit: Model) -> None:
         """Takes a fit of a model to the angle that was found elsewhere, if nearer."""
         if fit.fit.cost < self.moved(model).fit.cost:
-            self.fits[id(model)] = (model, fit)
+            self.fits[id(model)] = (model, refolded(self.output, fit))
+            self.bounded.pop(id(model), None)
 
     def nominal(self, model: Model) -> Model:
         """Returns `moved` with its other parameters fitted within their tolerances."""
@@ -184,7 +171,7 @@ class Judge:
         return self.errors[id(model)][1]
 
     def t_value(self, worse: Model, better: Model) -> float:
-        """T = d̄ √B / s_d of the block means d of w² (e₀² − e₁²) [1].
+        """T of the block means of w² (e₀² − e₁²), see `t_of_blocks` [1].
 
         With the weights w of the likelihood: what a servo's cycle makes of an angle at
         full speed speaks for no cause.
@@ -192,22 +179,10 @@ class Judge:
         Args:
             worse: the model of e₀.
             better: that of e₁.
-
-        Source:
-            F. X. Diebold, R. S. Mariano, Comparing Predictive Accuracy, Journal of
-            Business & Economic Statistics 13(3), 1995.
         """
-        before, after = (self._squared(m) for m in (worse, better))
+        gained = self._squared(worse) - self._squared(better)
         size = max(1, round(self.problem.block_s / (EVERY * self.problem.data.dt)))
-        gained = np.where(self.valid, before - after, 0.0)
-        edges = np.arange(0, len(gained), size)
-        sums = np.add.reduceat(gained, edges).ravel()
-        counts = np.add.reduceat(self.valid * 1.0, edges).ravel()
-        means = sums[counts > 0.5 * size] / counts[counts > 0.5 * size]
-        if len(means) < 2:
-            return 0.0
-        scatter = float(np.std(means, ddof=1)) / np.sqrt(len(means))
-        return float(np.mean(means)) / max(scatter, 1e-300)
+        return t_of_blocks(gained, self.valid, size)
 
     def fall(self, worse: Model, better: Model) -> float:
         """1 − √(Σ w² e₁² / Σ w² e₀²), what goes of the error of held-out angles [1].
@@ -219,8 +194,11 @@ class Judge:
         Source:
             Ours; an effect size beside the test of `t_value`.
         """
-        before, after = (self._squared(m)[self.valid].sum() for m in (worse, better))
+        before, after = (self._squared_sum(m) for m in (worse, better))
         return 1.0 - float(np.sqrt(after / max(before, 1e-300)))
+
+    def _squared_sum(self, model: Model) -> float:
+        return float(self._squared(model)[self.valid].sum())
 
     def _squared(self, model: Model) -> Float[np.ndarray, "m p"]:
         """Returns w² e², of what diverges no more than counts anyway [rad²]."""
@@ -231,10 +209,32 @@ class Judge:
     def pair(self, smaller: Model, larger: Model) -> tuple[Model, Model]:
         """Returns what is compared: fits to the angle, the smaller within tolerances.
 
-        Gains that nobody knows are to each model those that the effort shows to it.
+        Gains that nobody knows are to each model those that the effort shows to it; to
+        the smaller one those of the larger, too, where it is nearer with them. That
+        choice, by the error that is then compared, is for the smaller model.
         """
-        worse, better = self.serving(smaller), self.serving(larger)
-        return worse.nominal(smaller), better.moved(larger)
+        better = self.serving(larger)
+        judges = dict.fromkeys((self.serving(smaller), better))
+        known = better.moved(larger), *(judge.moved(smaller) for judge in judges)
+        key = tuple(map(id, known))  # a nearer fit found since makes another pair
+        if key not in self.pairs:
+            fits = [judge.without(smaller, known[0]) for judge in judges]
+            one = len(fits) == 1
+            before = fits[0] if one else min(fits, key=self._squared_sum)
+            self.pairs[key] = known, (before, known[0])
+        return self.pairs[key][1]
+
+    def without(self, smaller: Model, after: Model) -> Model:
+        """Returns `nominal`, of a fit to the angle that no larger model is nearer than.
+
+        Args:
+            smaller: the model.
+            after: the larger one, fitted to the angle.
+        """
+        if self.output is not self.problem:
+            fit = nearer_without(self.output, self.moved(smaller), after)
+            self.knows(smaller, fit)
+        return self.nominal(smaller)
 
     def confirms(self, smaller: Model, larger: Model) -> bool:
         """Whether the larger model predicts angles better, and by enough to matter."""
@@ -277,9 +277,10 @@ class Judge:
 
     def shows(self, smaller: Model, larger: Model) -> bool:
         """Whether the likelihood of the angle gains enough with the larger model."""
-        worse, after = self.serving(smaller), self.serving(larger).moved(larger)
-        # Either fit may end in a valley of its own: the better is the smaller model.
-        fits = worse.moved(smaller), worse.nominal(smaller)
+        after = self.pair(smaller, larger)[1]
+        # Any fit may end in a valley of its own: the best is the smaller model.
+        judges = dict.fromkeys((self.serving(smaller), self.serving(larger)))
+        fits = [f(smaller) for judge in judges for f in (judge.moved, judge.nominal)]
         before = min(fits, key=lambda m: m.fit.cost)
         gain = log_likelihood_gain(before, after, self.output.samples)
         return gain > NOMINAL_THRESHOLD

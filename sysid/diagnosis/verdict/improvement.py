@@ -5,6 +5,7 @@ from jaxtyping import Float
 
 from sysid.diagnosis.fits.candidate import Model
 from sysid.diagnosis.fits.problem import Problem
+from sysid.diagnosis.fits.refolded import refolded
 from sysid.diagnosis.fits.tolerances import within_tolerances
 from sysid.diagnosis.search.search import Search
 from sysid.diagnosis.simulated.output_error import OutputProblem
@@ -39,7 +40,8 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
 
 def _equation_gains(found: Search, units: dict[str, str], seed: int) -> dict[str, Gain]:
     problem, gains = found.problem, {}
-    models = (within_tolerances(problem, found.base), found.best)
+    base, best = within_tolerances(problem, found.base), refolded(problem, found.best)
+    models = (base, best)
     for k, name in enumerate(problem.channels):
         if problem.valid[k].any():
             before, after = (_heldout(problem, m, k) for m in models)

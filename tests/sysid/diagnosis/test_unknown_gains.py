@@ -16,8 +16,9 @@ from sysid.diagnosis.fits.intervals import standard_errors
 from sysid.diagnosis.fits.origins import begun_anew, near_nominal
 from sysid.diagnosis.fits.space import SIGMA
 from sysid.diagnosis.replay.track import all_tracks
-from sysid.diagnosis.search.judge import GAIN_TOLERANCE, Judge
+from sysid.diagnosis.search.judge import Judge
 from sysid.diagnosis.search.settling import settled
+from sysid.diagnosis.search.shown_gains import GAIN_TOLERANCE
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
 from sysid.mechanism import model_mechanism
@@ -110,9 +111,25 @@ def test_each_model_has_the_gains_that_the_effort_shows_to_it():
     other = replace(model, fit=replace(model.fit, theta=wrong))
     judge = Judge(problem, base)
     alone, beside = judge.pair(base, model)[0], judge.pair(base, other)[0]
-    assert beside is alone
+    assert beside.fit.cost == pytest.approx(alone.fit.cost, rel=1e-3)
     served = judge.serving(other).nominal(base)  # as it was once
     assert served.fit.cost > 2.0 * alone.fit.cost
+
+
+def test_the_smaller_model_may_have_the_gains_that_the_effort_shows_beside_the_effect():
+    """Its own may be wrong, and an effect that does nothing would be given what for."""
+    logs, mechanism = recorded(0.0)
+    (track,) = all_tracks(logs, mechanism)
+    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    (model,) = fit_models(problem, [("viscous_friction",)], [base.fit.theta], rounds=20)
+    (index,) = problem.space.of("damping")
+    wrong = np.array(base.fit.theta)
+    wrong[index] += 0.5
+    other = replace(base, fit=replace(base.fit, theta=wrong))
+    judge = Judge(problem, base)
+    own, without = judge.serving(other).nominal(other), judge.pair(other, model)[0]
+    assert judge.fall(own, without) > 0.3
+    assert not judge.prefers(other, model)
 
 
 def test_gains_are_no_surer_than_the_effort_shows_them():

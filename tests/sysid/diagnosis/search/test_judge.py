@@ -37,6 +37,9 @@ class Said(Judge):
     def nominal(self, model):
         return self._fitted(model, self.angle[0], self.costs[1])
 
+    def without(self, smaller, after):
+        return self.nominal(smaller)
+
     @staticmethod
     def _fitted(model, left, cost):
         more = {"errors": np.array([left]), "fit": SimpleNamespace(cost=cost)}

@@ -117,6 +117,7 @@ def model_with(error, gained=0.0):
     score = 2000.0 - 2.0 * gained
     fit = SimpleNamespace(cost=score)
     return SimpleNamespace(
+        effects=(),
         error=error,
         score=score,
         fit=fit,

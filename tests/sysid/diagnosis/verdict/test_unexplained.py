@@ -278,7 +278,9 @@ def test_what_contains_a_cause_takes_its_place_if_more_is_shown(searched, monkey
     assert exchange.exchanged(searched.problem, falls, base, judge)[0] is dry
 
 
-def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(searched):
+def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(
+    searched, monkeypatch
+):
     """Whatever the equations say; the verdict cannot be `found`."""
     problem, base = searched.problem, searched.base
     wrong = fit_models(problem, [("hysteresis",)], [base.fit.theta])[0]
@@ -291,6 +293,15 @@ def test_causes_that_bring_the_motion_no_nearer_are_no_explanation(searched):
     assert any("comes no nearer" in text for text in unexplained_signs(found))
     found.judge.errors[id(moved)] = (moved, 0.5 * near)
     assert not any("comes no nearer" in text for text in unexplained_signs(found))
+    # The report says the error of all samples, also of those that the judge discounts.
+    moment = np.flatnonzero(found.judge.valid.all(1))[5]
+    output, jump = found.judge.output, 0.5 * near
+    weight, jump[moment] = np.ones((2, *shape)), 10.0
+    weight[:, moment] = 1e-6
+    monkeypatch.setattr(found.judge, "output", replace(output, weight=weight))
+    found.judge.errors[id(moved)] = (moved, jump)
+    assert found.judge.t_value(found.judge.nominal(base), moved) > 0.0
+    assert any("comes no nearer" in text for text in unexplained_signs(found))
 
 
 def test_a_sentence_says_falls_only_where_something_falls():
