@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sysid.diagnosis.fits.candidate import CONVERGED, Model, nuisance_penalty, task_of
+from sysid.diagnosis.fits.candidate import CONVERGED, Model, task_of
 from sysid.diagnosis.fits.heldout import predicted
 from sysid.diagnosis.fits.problem import Problem
 from sysid.least_squares import fit_all
@@ -39,20 +39,18 @@ def refolded(problem: Problem, model: Model) -> Model:
         noisy = problem.with_remaining(problem.raw(model.fit.theta[None])[0])
     folds = range(len(model.fold_theta))
     thetas = np.stack([_without(noisy, model, fold) for fold in folds])
-    task = task_of(problem, model.effects, model.fit.theta)
-    penalty = nuisance_penalty(problem, task, model.effects, model.fit.theta)
     error = float(np.sum(predicted(problem, thetas) ** 2))
-    return replace(model, fold_theta=thetas, score=error + penalty)
+    return replace(model, fold_theta=thetas, score=error + model.penalty)
 
 
 def _without(problem: Problem, model: Model, fold: int) -> np.ndarray:
     """Fits a model without one fold, from the common optimum and from beside it."""
     kept = replace(problem, valid=problem.valid & (problem.fold != fold))
-    own, common = problem.space.local(), model.fit.theta
-    tasks = []
-    for start in (model.fold_theta[fold].copy(), common):
-        start[own] = common[own]  # of a record alone, which others do not show
-        task = task_of(kept, model.effects, start)
-        tasks.append(replace(task, free=np.setdiff1d(task.free, own)))
+    # What belongs to a record alone is as in the common fit: others do not show it.
+    common, own = model.fit.theta, problem.space.local()
+    beside = model.fold_theta[fold].copy()
+    beside[own] = common[own]
+    tasks = [task_of(kept, model.effects, start) for start in (beside, common)]
+    tasks = [replace(task, free=np.setdiff1d(task.free, own)) for task in tasks]
     fits = fit_all(kept.residual, tasks, CONVERGED)
     return min(fits, key=lambda fit: fit.cost).theta

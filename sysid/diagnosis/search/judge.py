@@ -127,6 +127,9 @@ class Judge:
             self.served[id(model)] = (model, judge)
         return self.served[id(model)][1]
 
+    def _serving_either(self, *models: Model) -> list["Judge"]:
+        return list(dict.fromkeys(self.serving(model) for model in models))
+
     def moved(self, model: Model) -> Model:
         """Returns a model of the equations fitted to the angle."""
         output, fit = self.output, model
@@ -213,15 +216,14 @@ class Judge:
         the smaller one those of the larger, too, where it is nearer with them. That
         choice, by the error that is then compared, is for the smaller model.
         """
-        better = self.serving(larger)
-        judges = dict.fromkeys((self.serving(smaller), better))
-        known = better.moved(larger), *(judge.moved(smaller) for judge in judges)
+        judges = self._serving_either(smaller, larger)
+        after = self.serving(larger).moved(larger)
+        known = after, *(judge.moved(smaller) for judge in judges)
         key = tuple(map(id, known))  # a nearer fit found since makes another pair
         if key not in self.pairs:
-            fits = [judge.without(smaller, known[0]) for judge in judges]
-            one = len(fits) == 1
-            before = fits[0] if one else min(fits, key=self._squared_sum)
-            self.pairs[key] = known, (before, known[0])
+            fits = [judge.without(smaller, after) for judge in judges]
+            before = min(fits, key=self._squared_sum) if fits[1:] else fits[0]
+            self.pairs[key] = known, (before, after)
         return self.pairs[key][1]
 
     def without(self, smaller: Model, after: Model) -> Model:
@@ -279,7 +281,7 @@ class Judge:
         """Whether the likelihood of the angle gains enough with the larger model."""
         after = self.pair(smaller, larger)[1]
         # Any fit may end in a valley of its own: the best is the smaller model.
-        judges = dict.fromkeys((self.serving(smaller), self.serving(larger)))
+        judges = self._serving_either(smaller, larger)
         fits = [f(smaller) for judge in judges for f in (judge.moved, judge.nominal)]
         before = min(fits, key=lambda m: m.fit.cost)
         gain = log_likelihood_gain(before, after, self.output.samples)

@@ -40,8 +40,7 @@ def residual_gains(found: Search, units: dict[str, str], seed: int) -> dict[str,
 
 def _equation_gains(found: Search, units: dict[str, str], seed: int) -> dict[str, Gain]:
     problem, gains = found.problem, {}
-    base, best = within_tolerances(problem, found.base), refolded(problem, found.best)
-    models = (base, best)
+    models = within_tolerances(problem, found.base), refolded(problem, found.best)
     for k, name in enumerate(problem.channels):
         if problem.valid[k].any():
             before, after = (_heldout(problem, m, k) for m in models)

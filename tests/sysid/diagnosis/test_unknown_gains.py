@@ -64,6 +64,20 @@ def recorded(viscous_nms, free=True, seed=0):
     return [log], model_mechanism(model, {"servo": JointDrive(*gains)})
 
 
+def nominal(viscous_nms, free=True):
+    """The problem of such a servo, and its model without an effect."""
+    logs, mechanism = recorded(viscous_nms, free)
+    (track,) = all_tracks(logs, mechanism)
+    return settled(problem_of(track, logs, mechanism, company=False))
+
+
+def with_wrong_damping(problem, model):
+    """The model as if the effort had shown it a damping of e^0.5 times that."""
+    theta = np.array(model.fit.theta)
+    theta[problem.space.of("damping")] += 0.5
+    return replace(model, fit=replace(model.fit, theta=theta))
+
+
 def test_friction_beside_a_free_damping_is_found():
     said = diagnose(*recorded(0.1))
     causes = [c.effect for c in said.causes]
@@ -79,9 +93,7 @@ def test_other_gains_alone_are_no_cause():
 @pytest.mark.parametrize("free", [True, False])
 def test_the_judge_takes_free_gains_from_the_effort(free):
     """Known ones keep their tolerances."""
-    logs, mechanism = recorded(0.1, free)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.1, free)
     start = base.fit.theta
     (model,) = fit_models(problem, [("viscous_friction",)], [start], rounds=20)
     judge = Judge(problem, base)
@@ -101,16 +113,12 @@ def test_the_judge_takes_free_gains_from_the_effort(free):
 
 def test_each_model_has_the_gains_that_the_effort_shows_to_it():
     """Those of a wrong cause would make the simulation without it wrong."""
-    logs, mechanism = recorded(0.0)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.0)
     (model,) = fit_models(problem, [("viscous_friction",)], [base.fit.theta], rounds=20)
-    (index,) = problem.space.of("damping")
-    wrong = np.array(model.fit.theta)
-    wrong[index] += 0.5
-    other = replace(model, fit=replace(model.fit, theta=wrong))
+    other = with_wrong_damping(problem, model)
     judge = Judge(problem, base)
     alone, beside = judge.pair(base, model)[0], judge.pair(base, other)[0]
+    assert beside is judge.serving(base).nominal(base)
     assert beside.fit.cost == pytest.approx(alone.fit.cost, rel=1e-3)
     served = judge.serving(other).nominal(base)  # as it was once
     assert served.fit.cost > 2.0 * alone.fit.cost
@@ -118,14 +126,9 @@ def test_each_model_has_the_gains_that_the_effort_shows_to_it():
 
 def test_the_smaller_model_may_have_the_gains_that_the_effort_shows_beside_the_effect():
     """Its own may be wrong, and an effect that does nothing would be given what for."""
-    logs, mechanism = recorded(0.0)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.0)
     (model,) = fit_models(problem, [("viscous_friction",)], [base.fit.theta], rounds=20)
-    (index,) = problem.space.of("damping")
-    wrong = np.array(base.fit.theta)
-    wrong[index] += 0.5
-    other = replace(base, fit=replace(base.fit, theta=wrong))
+    other = with_wrong_damping(problem, base)
     judge = Judge(problem, base)
     own, without = judge.serving(other).nominal(other), judge.pair(other, model)[0]
     assert judge.fall(own, without) > 0.3
@@ -133,9 +136,7 @@ def test_the_smaller_model_may_have_the_gains_that_the_effort_shows_beside_the_e
 
 
 def test_gains_are_no_surer_than_the_effort_shows_them():
-    logs, mechanism = recorded(0.1)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.1)
     (index,) = problem.space.of("damping")
     fit = base.fit
     noisy = replace(base, fit=replace(fit, jacobian=1e-3 * fit.jacobian))
@@ -146,9 +147,7 @@ def test_gains_are_no_surer_than_the_effort_shows_them():
 @pytest.mark.parametrize("free", [True, False])
 def test_fits_begin_anew_with_free_gains_as_they_were_found(free):
     """They have no nominal value; known ones have, and masses do."""
-    logs, mechanism = recorded(0.1, free)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.1, free)
     values = problem.space.values(near_nominal(problem, base)[None])[0]
     kept = values["stiffness"]["scale"][0]
     assert (kept > 1.4) == free  # it is 2, and friction takes a part of it
@@ -158,9 +157,7 @@ def test_fits_begin_anew_with_free_gains_as_they_were_found(free):
 
 @pytest.mark.parametrize("free", [True, False])
 def test_a_nominal_fit_that_went_astray_for_a_gain_comes_back(free):
-    logs, mechanism = recorded(0.0, free)
-    (track,) = all_tracks(logs, mechanism)
-    problem, base = settled(problem_of(track, logs, mechanism, company=False))
+    problem, base = nominal(0.0, free)
     theta = np.array(base.fit.theta)
     (load,) = problem.space.of("payload_mass")
     theta[load] += 1.0

@@ -58,7 +58,8 @@ def fitted(problem):
     task = Task(sizes, np.arange(2), 2.0 * sizes, sizes, 0.1 * sizes, 10.0 * sizes)
     fit = fit_all(problem.residual, [task], 30)[0]
     held = held_out(problem, [task], [fit])[0]
-    parts = held.error, 0.0, held.theta, np.ones(2), 0.0
+    penalty = float(np.sum((fit.theta - 2.0) ** 2))
+    parts = held.error, penalty, held.theta, np.ones(2), 0.0
     return Model((), fit, *parts)
 
 
