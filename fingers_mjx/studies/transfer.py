@@ -39,6 +39,9 @@ MEASURES = ("task_speed_mps", "survival", "turn_rate_error_rad_s")
 BY_SIZE = ("drift_deg_s", "sideways_mps")
 """Measures that are compared by their size, whatever their side."""
 
+Values = Mapping[str, Mapping[str, Sequence[float | None]]]
+"""Means over episodes by measure and arm, one for each seed."""
+
 STRAIGHT = (0.10, 0.0, 0.0)
 """Command of the episodes in which drift is measured: v_x, v_y [m/s], yaw [rad/s]."""
 
@@ -164,6 +167,10 @@ def compared(
         raise InputError("compared", "sources", sizes, "two arms with equal seeds")
     tables = {name: [columns(one) for one in arm] for name, arm in found.items()}
     task = next(iter(sources.values()))[0].setup.train.task
+    values = {
+        name: {arm: [_mean(name, one) for one in of] for arm, of in tables.items()}
+        for name in next(iter(tables.values()))[0]
+    }
     document = {
         "seeds": list(seeds),
         "policies": {
@@ -173,7 +180,7 @@ def compared(
             ]
             for name, arm in sources.items()
         },
-        "gain": _gains(tables, seeds, task),
+        "gain": gains(values, seeds, task),
         "conditions": dict(conditions),
     }
     if len(seeds) == 1:
@@ -181,43 +188,40 @@ def compared(
     return document
 
 
-def _gains(
-    tables: Mapping[str, Sequence[Mapping[str, np.ndarray]]],
-    seeds: Sequence[int],
-    task: str,
-) -> dict[str, dict[str, Any]]:
-    """Second arm less first over seeds, and the values of both, for each measure."""
-    other, ours = tables.values()
-    rows, values = [], {}
-    for name in other[0]:
-        pairs = pair(*(_values(name, arm, seeds) for arm in (ours, other)))
+def gains(values: Values, seeds: Sequence[int], task: str) -> dict[str, dict[str, Any]]:
+    """Returns the second arm less the first, paired over seeds, for each measure.
+
+    Args:
+        values: by measure and arm, one mean for each seed; None where none is defined.
+        seeds: of the trainings, in the order of the means.
+        task: of the policies.
+    """
+    rows = []
+    for name, arms in values.items():
+        (_, other), (arm, ours) = arms.items()
+        pairs = pair(_by_seed(seeds, ours), _by_seed(seeds, other))
         direction = better(task, name)
-        found = difference(pairs, direction)
-        rows.append(Row(list(tables)[1], name, direction, found, None))
-        values[name] = {
-            arm: [_known(x) for x in _values(name, policies, seeds).values()]
-            for arm, policies in tables.items()
-        }
+        rows.append(Row(arm, name, direction, difference(pairs, direction), None))
     return {
         row.measure: {
             **dataclasses.asdict(row.difference),
             "better": row.better,
             "p_holm": row.p_holm,
-            "values": values[row.measure],
+            "values": {arm: [*of] for arm, of in values[row.measure].items()},
         }
         for row in corrected(rows)
     }
 
 
-def _values(
-    name: str, policies: Sequence[Mapping[str, np.ndarray]], seeds: Sequence[int]
-) -> dict[int, float]:
-    """Mean over the episodes of each policy that define a measure; else NaN."""
-    found = {}
-    for seed, table in zip(seeds, policies, strict=True):
-        defined = _size(name, table[name])[np.isfinite(table[name])]
-        found[seed] = float(defined.mean()) if len(defined) else np.nan
-    return found
+def _by_seed(seeds: Sequence[int], means: Sequence[float | None]) -> dict[int, float]:
+    known = [np.nan if mean is None else mean for mean in means]
+    return dict(zip(seeds, known, strict=True))
+
+
+def _mean(name: str, table: Mapping[str, np.ndarray]) -> float | None:
+    """Mean over the episodes of a policy that define a measure."""
+    defined = _size(name, table[name])[np.isfinite(table[name])]
+    return _known(float(defined.mean())) if len(defined) else None
 
 
 def _size(name: str, values: np.ndarray) -> np.ndarray:

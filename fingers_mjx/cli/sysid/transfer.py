@@ -133,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2, allow_nan=False)
     write_atomic(args.out / "transfer.json", text)
-    _show(document)
+    show(document)
     return 0
 
 
@@ -186,8 +186,12 @@ def _check_alike(sources: list[PolicySource]) -> None:
                 raise InputError(other.path, what, b, f"{a}, as the first policy")
 
 
-def _show(document: dict[str, Any]) -> None:
-    """Prints the comparison."""
+def show(document: dict[str, Any]) -> None:
+    """Prints the comparison.
+
+    Args:
+        document: of `fingers_mjx.studies.transfer.compared`.
+    """
     from fingers_mjx.cli.output import print_table
     from fingers_mjx.studies.comparison.tables import ARROWS, interval, short
     from fingers_mjx.studies.statistics.compare import ONE_SEED
