@@ -17,7 +17,7 @@ def part(seeds, generator=None, **changed):
     """A comparison of policies whose means are drawn."""
     generator = generator or np.random.default_rng(0)
     measures = ("task_speed_mps", "drift_deg_s", "survival")
-    values = {
+    values: dict[str, dict[str, list]] = {
         name: {
             arm: [float(x) for x in generator.normal(size=len(seeds))] for arm in ARMS
         }
