@@ -27,7 +27,7 @@ and an effect may hide in that."""
 def nearest(judge: Judge, model: Model) -> Model:
     """Returns the nearer fit to the angle: with all free, or with the effort's gains.
 
-    Gains that nobody knows may lead the first into a valley of their own.
+    Gains that are hardly known may lead the first into a valley of their own.
     """
     fits = (judge.moved(model), judge.serving(model).moved(model))
     return min(fits, key=lambda m: float(m.errors.sum()))

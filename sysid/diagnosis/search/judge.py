@@ -14,8 +14,8 @@ its blocks,
 must exceed `LEVEL`, and the log predictive likelihood must gain as much as a nominal
 parameter that leaves its tolerance. And it must matter: the root mean square of the
 error must fall by the share `LEAST_FALL`, or from clearly more than noise to about
-that. Gains of a servo that nobody knows are those that the logged effort shows to that
-model, as surely as it does: free ones would do in the simulation what the effect does.
+that. Gains of a servo that are hardly known are those that the logged effort shows to
+that model, if surer: loose ones would do in the simulation what the effect does.
 Without the effect they may be those that it shows beside the effect, too, whichever
 come nearer: what a gain does is no work of the effect. The likelihood need not gain
 where the logged effort has no other explanation: what parameters a little out of their
@@ -111,10 +111,10 @@ class Judge:
         return output
 
     def serving(self, model: Model) -> "Judge":
-        """Returns the judge to whom unknown gains are those of a model of the effort.
+        """Returns the judge to whom loose gains are those of a model of the effort.
 
         Args:
-            model: fitted to the equations; itself, where its gains are known or the
+            model: fitted to the equations; itself, where gains are as sure or the
                 angle alone was fitted.
         """
         if self.output is self.problem:
@@ -212,7 +212,7 @@ class Judge:
     def pair(self, smaller: Model, larger: Model) -> tuple[Model, Model]:
         """Returns what is compared: fits to the angle, the smaller within tolerances.
 
-        Gains that nobody knows are to each model those that the effort shows to it; to
+        Gains that are hardly known are to each model those that the effort shows; to
         the smaller one those of the larger, too, where it is nearer with them. That
         choice, by the error that is then compared, is for the smaller model.
         """

@@ -25,6 +25,7 @@ from sysid.diagnosis.search.decided import decided_by_angle
 from sysid.diagnosis.search.exchange import MOST, exchanged, pruned, swapped
 from sysid.diagnosis.search.judge import TRIED, Judge
 from sysid.diagnosis.search.parts import EXCESS, in_parts
+from sysid.diagnosis.search.remains import leaves_much
 from sysid.diagnosis.search.selection import accepted
 from sysid.diagnosis.search.settling import refitted, settled
 from sysid.diagnosis.search.stage import (
@@ -32,7 +33,7 @@ from sysid.diagnosis.search.stage import (
     simplest_first,
     still_accepted,
 )
-from sysid.diagnosis.simulated.output_error import output_problem
+from sysid.diagnosis.simulated.output_error import OutputProblem, output_problem
 from sysid.diagnosis.simulated.settled_output import settled_output
 
 STRAINED = 25.0
@@ -127,7 +128,21 @@ def search(problem: Problem) -> Search:
         problem, base = found.problem, found.base
     problem = problem.with_remaining(problem.raw(found.best.fit.theta[None])[0])
     base = fit_models(problem, [()], [base.fit.theta])[0]
-    return _with_first(_searched(problem, base), found.best)
+    again = _with_first(_searched(problem, base), found.best)
+    return found if _loses_angle(again, found) else again
+
+
+def _loses_angle(again: Search, first: Search) -> bool:
+    """Whether a second search leaves much of an angle that the first answer explains.
+
+    Noise that counts for more in the equations takes nothing from what the angle says.
+    """
+    judge = first.judge
+    if judge.output is first.problem or not isinstance(judge.output, OutputProblem):
+        return False
+    base, best, last = (nearest(judge, m) for m in (first.base, first.best, again.best))
+    much = leaves_much(base.errors[1], last.errors[1])
+    return much and explained(base, best, last)
 
 
 def _with_first(again: Search, first: Model) -> Search:

@@ -32,7 +32,7 @@ ARM = """
 PERIOD_S, PERIODS = 6.0, 3
 
 
-def recorded(viscous_nms, free=True, seed=0):
+def recorded(viscous_nms, free=True, seed=0, tolerance=0.05):
     """A log of a servo at a pendulum with this friction, and what is known of it."""
     rng = np.random.default_rng(seed)
     rows = round(PERIOD_S * RATE_HZ)
@@ -59,14 +59,14 @@ def recorded(viscous_nms, free=True, seed=0):
         "tau.servo": np.array(effort) + noise[1],
     }
     log = make_log(("servo",), np.arange(len(cmd)) / RATE_HZ, columns)
-    gains = [Nominal(0.5 * KP, free=free), Nominal(3.0 * KD, free=free)]
+    gains = [Nominal(x, tolerance, free=free) for x in (0.5 * KP, 3.0 * KD)]
     model = mujoco.MjModel.from_xml_string(ARM)
     return [log], model_mechanism(model, {"servo": JointDrive(*gains)})
 
 
-def nominal(viscous_nms, free=True):
+def nominal(viscous_nms, free=True, tolerance=0.05):
     """The problem of such a servo, and its model without an effect."""
-    logs, mechanism = recorded(viscous_nms, free)
+    logs, mechanism = recorded(viscous_nms, free, tolerance=tolerance)
     (track,) = all_tracks(logs, mechanism)
     return settled(problem_of(track, logs, mechanism, company=False))
 
@@ -109,6 +109,35 @@ def test_the_judge_takes_free_gains_from_the_effort(free):
             assert unsure < slot.prior_sd
         else:
             assert slot == problem.space.slots[index]
+
+
+@pytest.mark.parametrize(("tolerance", "damping"), [(1.5, 1.0 / 3.0), (0.5, None)])
+def test_the_effort_knows_a_gain_better_than_a_wide_tolerance(tolerance, damping):
+    """And does not leave it: a gain of a third is beyond a tolerance of a half."""
+    problem, base = nominal(0.1, free=False, tolerance=tolerance)
+    start = base.fit.theta
+    (model,) = fit_models(problem, [("viscous_friction",)], [start], rounds=20)
+    space = Judge(problem, base).serving(model).output.space
+    for effect, ratio in (("stiffness", 2.0), ("damping", damping)):
+        (index,) = problem.space.of(effect)
+        known, slot = problem.space.slots[index], space.slots[index]
+        assert slot.prior_sd == pytest.approx(SIGMA * GAIN_TOLERANCE)
+        assert abs(slot.nominal) <= tolerance + 1e-9
+        if tolerance > 1.0:
+            assert np.exp(slot.nominal) == pytest.approx(ratio, rel=0.1)
+        else:
+            assert abs(slot.nominal) == pytest.approx(tolerance)
+        assert known.prior_sd == pytest.approx(SIGMA * tolerance)
+
+
+def test_a_gain_that_is_the_effect_keeps_its_tolerance():
+    problem, base = nominal(0.0, free=False, tolerance=0.5)
+    (model,) = fit_models(problem, [("damping",)], [base.fit.theta], rounds=20)
+    space = Judge(problem, base).serving(model).output.space
+    for effect in ("stiffness", "damping"):
+        (index,) = problem.space.of(effect)
+        same = space.slots[index] == problem.space.slots[index]
+        assert same == (effect == "damping")
 
 
 def test_each_model_has_the_gains_that_the_effort_shows_to_it():

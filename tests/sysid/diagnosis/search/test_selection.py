@@ -118,6 +118,7 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     monkeypatch.setattr(searching, "_searched", searched)
     monkeypatch.setattr(searching, "_by_angle", lambda found: found)
     monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
+    monkeypatch.setattr(searching, "_loses_angle", lambda again, first: False)
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
@@ -150,6 +151,34 @@ def test_a_second_search_does_not_lose_the_answer_of_the_first(
     monkeypatch.setattr(searching, "_searched", lambda *begun: begun)
     found = searching._with_first(again, answer)
     assert found == (("problem", "base", answer) if kept else again)
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "kept"),
+    [
+        (0.8, 45.0, True),
+        (0.8, 1.2, False),
+        (44.0, 45.0, False),
+        (None, 45.0, False),
+    ],
+)
+def test_what_the_angle_was_explained_by_is_not_lost_to_the_noise_of_the_equations(
+    monkeypatch, first, second, kept
+):
+    """Of an angle's error of 45 a first answer leaves so much, and a second one."""
+
+    def left(error, effects=()):
+        return SimpleNamespace(effects=effects, errors=np.array([0.0, error]))
+
+    monkeypatch.setattr(searching, "nearest", lambda _, model: model)
+    output = object.__new__(searching.OutputProblem)
+    best = left(45.0) if first is None else left(first, ("stribeck_friction",))
+    base, judge = left(45.0), SimpleNamespace(output=output)
+    found = SimpleNamespace(judge=judge, problem="equations", base=base, best=best)
+    again = SimpleNamespace(best=left(second, ("deadband",)))
+    assert searching._loses_angle(again, found) == kept
+    found.problem = output  # the angle decided, and there is one search of it
+    assert not searching._loses_angle(again, found)
 
 
 def test_a_model_that_was_left_behind_is_fitted_from_where_the_smaller_one_is():
