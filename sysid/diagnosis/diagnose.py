@@ -180,6 +180,7 @@ def _examined(
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
     result = search(problem)
+    problem.evaluated.forget()
     decided = result.problem
     equations = decided.equations if isinstance(decided, OutputProblem) else decided
     return Examined(decided.data, equations, result)

@@ -1,15 +1,15 @@
 """Encoder disc or magnet off the axis: an error once per turn."""
 
-import jax.numpy as jnp
-
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, normal
+from envs.actuator.trigonometry import sine_cosine
 
 
 def _act(params: Params, state, x, dt):
     """Sine and cosine instead of size and phase: both vanish at 0 and fit linearly."""
     sine, cosine = params["sine_rad"], params["cosine_rad"]
-    slope = 1.0 + sine * jnp.cos(x.q) - cosine * jnp.sin(x.q)
-    shift = sine * jnp.sin(x.q) + cosine * jnp.cos(x.q)
+    sin_q, cos_q = sine_cosine(x.q)
+    slope = 1.0 + sine * cos_q - cosine * sin_q
+    shift = sine * sin_q + cosine * cos_q
     speed = x.encoder_speed * slope
     return state, x.replace(encoder=x.encoder + shift, encoder_speed=speed)
 

@@ -4,6 +4,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, ArrayLike, Float
 
 from envs.actuator.effect import EffectKind, Parameter, Params, Stage, normal
+from envs.actuator.trigonometry import sine_cosine
 
 
 def tilted(
@@ -28,9 +29,10 @@ def tilted(
     turn = jnp.stack(jnp.broadcast_arrays(roll, pitch, 0.0), axis=-1)
     half = -0.5 * turn
     angle = jnp.sqrt(jnp.sum(half**2, axis=-1, keepdims=True) + 1e-24)
-    vector = jnp.sinc(angle / jnp.pi) * half
+    sine, cosine = sine_cosine(angle)
+    vector = sine / angle * half
     moved = 2.0 * jnp.cross(vector, gravity)
-    return gravity + jnp.cos(angle) * moved + jnp.cross(vector, moved)
+    return gravity + cosine * moved + jnp.cross(vector, moved)
 
 
 def _load(params: Params, state, x, dt):

@@ -15,15 +15,18 @@ Batch = tuple[Shaped[np.ndarray, "l ..."], int]
 """Candidates, and how many of them are asked for."""
 
 
-def in_lanes(candidates: Shaped[np.ndarray, "c ..."]) -> Iterator[Batch]:
-    """Yields batches of one size, the last filled up with its first candidate.
+def in_lanes(
+    candidates: Shaped[np.ndarray, "c ..."], most: int = LANES
+) -> Iterator[Batch]:
+    """Yields batches of `most`, and of few what is left; each filled up with its first.
 
     Args:
         candidates: their coordinates [1], or their numbers.
+        most: size of a batch of many.
     """
-    lanes = FEW_LANES if len(candidates) <= 2 * FEW_LANES else LANES
-    for first in range(0, len(candidates), lanes):
-        some = candidates[first : first + lanes]
+    while len(candidates):
+        lanes = FEW_LANES if len(candidates) <= 2 * FEW_LANES else most
+        some, candidates = candidates[:lanes], candidates[lanes:]
         filled = np.repeat(some[:1], lanes - len(some), 0)
         yield np.concatenate([some, filled]), len(some)
 
@@ -35,4 +38,4 @@ def lanes_first(found: ArrayLike, count: int) -> Float[np.ndarray, "c ..."]:
         found: results of a batch, its candidates last.
         count: number of candidates that are asked for.
     """
-    return np.moveaxis(np.asarray(found, float), -1, 0)[:count]
+    return np.moveaxis(np.asarray(found), -1, 0)[:count]

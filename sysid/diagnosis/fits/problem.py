@@ -7,15 +7,14 @@ and a candidate's residual that is larger counts with its correlation in time.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass, field, replace
 from typing import ClassVar
 
 import jax.numpy as jnp
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
+from sysid.diagnosis.fits.equations import Evaluated, equation_errors
 from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.likelihood.folds import BLOCK_S, folds_of, stay_whole
 from sysid.diagnosis.likelihood.noise_floor import difference_noise
@@ -30,8 +29,6 @@ from sysid.diagnosis.likelihood.whitening import (
 )
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.noise import band_noise
-from sysid.diagnosis.replay.residuals import equation_error
-from sysid.diagnosis.side_by_side import side_by_side
 from sysid.logs.log import MeasuredLog
 
 
@@ -55,6 +52,7 @@ class Problem:
         whole: whether folds are settings or loads instead, which are not divided.
         inflated: square of the noise over that which was measured, of both residuals:
             more than one where what a model left counts as noise [1].
+        evaluated: what has been evaluated of the equations.
     """
 
     channels: ClassVar[tuple[str, str]] = ("controller", "mechanics")
@@ -71,6 +69,7 @@ class Problem:
     block_s: float = BLOCK_S
     whole: bool = False
     inflated: tuple[float, float] = (1.0, 1.0)
+    evaluated: Evaluated = field(default_factory=Evaluated)
 
     def raw(
         self, thetas: Float[np.ndarray, "c n"], weigh: bool = True
@@ -87,17 +86,9 @@ class Problem:
         Source:
             Ours.
         """
-        batches = [partial(self._batch, *batch) for batch in in_lanes(thetas)]
-        parts = side_by_side(batches)
+        found = equation_errors(self.data, self.space, thetas, self.evaluated)
         weight = self.weight if weigh else 1.0
-        return np.where(self.valid, np.concatenate(parts) * weight, 0.0)
-
-    def _batch(self, lanes: Float[np.ndarray, "l n"], count: int) -> np.ndarray:
-        """Residuals of the first candidates of a batch."""
-        track, speed = self.data.track, np.float32(self.data.friction_speed)
-        values = self.space.values(lanes)
-        out = equation_error(track, *values, speed, self.data.dt, self.space.effects)
-        return lanes_first(out, count)
+        return np.where(self.valid, found.astype(float) * weight, 0.0)
 
     def whitened(self, raw: Float[np.ndarray, "c 2 m p"]) -> Float[np.ndarray, "c r"]:
         """Whitens residuals: ε_t = (r_t − Σ_k a_k r_{t−k}) / s.

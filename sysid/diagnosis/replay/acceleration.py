@@ -93,9 +93,10 @@ def way_to(
         Ours: exact without a low-pass, and with one to second order in `PART_S`.
     """
     last, target, cutoff = goal
-    # A goal that no low-pass moves is held for all the time.
-    moving = jnp.max(jnp.where(jnp.isfinite(cutoff), time, 0.0))
-    count = jnp.maximum(jnp.ceil(moving / PART_S - 0.01), 1.0).astype(jnp.int32)
+    # A goal that no low-pass moves is held for all the time. Each candidate has parts
+    # of its own: those of others would make its way depend on its company.
+    moving = jnp.where(jnp.isfinite(cutoff), time, 0.0)
+    count = jnp.maximum(jnp.ceil(moving / PART_S - 0.01), 1.0)
     acceleration = jnp.where(limits.act, limits.acceleration, 1.0)
     go = partial(profiled, fastest=limits.speeds, acceleration=acceleration)
     part = time / count
@@ -106,8 +107,10 @@ def way_to(
         gap, after = go(gap=now - command, speed=speed, dt=part)
         there = now - gap
         added = 0.5 * (command + there) + part * (speed - after) / 12.0
-        return there, after, mean + added / count
+        acts, new = k < count, (there, after, mean + added / count)
+        return tuple(jnp.where(acts, a, b) for a, b in zip(new, carry, strict=True))
 
     carry = (*start, jnp.zeros_like(start[0]))
-    command, speed, mean = jax.lax.fori_loop(0, count, within, carry)
+    most = jnp.max(count).astype(jnp.int32)
+    command, speed, mean = jax.lax.fori_loop(0, most, within, carry)
     return Way((start[0], command), (start[1], speed), mean, time)

@@ -14,14 +14,11 @@ readings that are late, the target was sent that much later.
 import flax.struct
 import jax
 import jax.numpy as jnp
-import numpy as np
 from jaxtyping import Array, Float
 
 from envs.actuator.effects.command_quantization import quantized
-from envs.actuator.effects.directional_slew import towards
-from envs.actuator.effects.lowpass_cutoff import filtered
-from envs.actuator.effects.slew_limit import limited
-from sysid.diagnosis.replay.acceleration import Limits, way_to
+from sysid.diagnosis.replay.acceleration import Limits
+from sysid.diagnosis.replay.target_path import WITHIN, Path, PathState
 
 EFFECTS = (
     "transport_delay",
@@ -34,11 +31,6 @@ EFFECTS = (
     "clock_drift",
 )
 """Effects that act here."""
-
-WITHIN = (0.35, 0.7)
-"""Times within a step at which the command is returned too [steps]."""
-
-_WITHIN = np.asarray(WITHIN, np.float32)[:, None, None]
 
 Params = dict[str, dict[str, Float[Array, " c"]]]
 
@@ -64,7 +56,11 @@ class Commands:
 
 
 def command_path(
-    held: Float[Array, "t s p"], sent: Float[Array, "t s p"], params: Params, dt: float
+    held: Float[Array, "t s p"],
+    sent: Float[Array, "t s p"],
+    params: Params,
+    dt: float,
+    between: bool = True,
 ) -> Commands:
     """Commands of candidates c at the steps of the grid: c(t) = path(t − T − L − d t).
 
@@ -76,6 +72,8 @@ def command_path(
         sent: when they were sent before that end, negative [steps].
         params: values of the parameters by effect; effects may be missing.
         dt: step of the grid [s].
+        between: whether anybody asks what is ahead within a step; else that is zero,
+            and the path takes half the time.
 
     Returns:
         The commands [rad].
@@ -89,65 +87,63 @@ def command_path(
         rest = {k: v for k, v in params.items() if k != "acceleration_limit"}
         path, mean, ahead = jax.lax.cond(
             jnp.any(limit),
-            lambda: _walk(held, sent, params, dt),
-            lambda: _walk(held, sent, rest, dt),
+            lambda: _walk(held, sent, params, dt, between),
+            lambda: _walk(held, sent, rest, dt, between),
         )
     else:
-        path, mean, ahead = _walk(held, sent, params, dt)
+        path, mean, ahead = _walk(held, sent, params, dt, between)
     steps = _steps_late(params, len(held), dt)
     place = jnp.arange(len(path))[:, None] - jnp.round(steps)
     place = jnp.clip(place, 0.0, len(path) - 1.0).astype(jnp.int32)
-    ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
+    if between:
+        ahead = jnp.take_along_axis(ahead, place[:, None, None], 0)
     late = [read_late(x, steps) for x in (path, mean, _ripple(path, mean))]
     return Commands(late[0], late[1], late[2], ahead)
 
 
-def _walk(held, sent, params: Params, dt: float) -> tuple[Array, Array, Array]:
+def paths_of(made: Commands) -> Float[Array, "k t p c"]:
+    """All of the commands but the mean, one behind the other [rad]."""
+    ahead = jnp.broadcast_to(
+        made.ahead, (len(made.path), len(WITHIN), *made.path.shape[1:])
+    )
+    return jnp.stack([made.path, made.ripple, *jnp.moveaxis(ahead, 1, 0)])
+
+
+def commands_of(paths: Float[Array, "c k t p"]) -> Commands:
+    """The same commands again, without a mean: `paths_of`, its candidates in front."""
+    path, ripple, *ahead = jnp.moveaxis(paths, 0, -1)
+    return Commands(path, path, ripple, jnp.stack(ahead, 1))
+
+
+def _walk(
+    held, sent, params: Params, dt: float, between: bool
+) -> tuple[Array, Array, Array]:
     """Path, mean and what is ahead, up to whole steps of the delays."""
     grid, age = _grid(params), _age(params, dt)
     cutoff = _value(params, "lowpass_cutoff", "cutoff_hz", jnp.inf)
-    limits = _limits(params)
-    speeds = limits.speeds
-    lag_s = 1.0 / (2.0 * jnp.pi * cutoff)
-    gentle = "acceleration_limit" in params
+    path = Path(grid, cutoff, _limits(params), dt)
+
+    def target(now: PathState, row):
+        # Most targets of a step take no time in it.
+        idle = jnp.all(row[2] <= 0.0)
+        return jax.lax.cond(idle, lambda s, *_: s, path.behind, now, *row), None
 
     def step(carry, row):
-        smooth, command, *rate = carry
-        targets, times = row
+        (smooth, command, rate), (targets, times) = carry, row
         begin = _begins(times, age)
         begin = begin.at[0].set(0.0)
         parts = jnp.diff(begin, axis=0, append=jnp.ones_like(begin[:1]))
-        total, passed = jnp.zeros_like(command), command
-        for target, start, part in zip(targets, begin, parts, strict=True):
-            # No time at all would make 0 × ∞ of an absent limit; it changes nothing.
-            acts, h = part > 0.0, jnp.maximum(part, 1e-6) * dt
-            last, before = smooth, command
-            goal = quantized(target[:, None], grid)
-            smooth = _chosen(acts, filtered(last, goal, cutoff, h), last)
-            # Without a low-pass the goal is there at once, and does not come evenly.
-            since = _chosen(jnp.isinf(cutoff), smooth, last)
-            moved = _pursuit(before, since, smooth, speeds, h)
-            command = _chosen(acts, moved, before)
-            follows = (before == last) & (command == smooth)
-            mean = goal - (smooth - last) * lag_s / h
-            mean = jnp.where(follows, mean, 0.5 * (before + command))
-            within = jnp.clip(_WITHIN - start, 1e-6, h / dt) * dt
-            there = filtered(last, goal, cutoff, within)
-            there = _pursuit(before, since, there, speeds, within)
-            if gentle:
-                way = way_to((before, rate[0]), (last, goal, cutoff), limits, h)
-                command = _chosen(acts & limits.act, way.command[1], command)
-                rate[0] = _chosen(acts & limits.act, way.speed[1], rate[0])
-                mean = _chosen(limits.act, way.mean, mean)
-                there = _chosen(limits.act, way.at(within / h), there)
-            total += part * mean
-            passed += acts * (start < _WITHIN) * (there - passed)
-        return (smooth, command, *rate), (command, total, command - passed)
+        wide = jnp.broadcast_to(command, (len(WITHIN), *command.shape))
+        none = jnp.zeros_like(command)
+        now = PathState(smooth, command, none, wide if between else None, rate)
+        now = jax.lax.scan(target, now, (targets, begin, parts))[0]
+        ahead = none[None] if now.passed is None else now.command - now.passed
+        return (now.smooth, now.command, now.rate), (now.command, now.total, ahead)
 
     first = quantized(held[0, 0][:, None], grid)
     first = jnp.broadcast_to(first, (held.shape[2], len(age)))
-    rest = [jnp.zeros_like(first)] if gentle else []
-    return jax.lax.scan(step, (first, first, *rest), (held, sent))[1]
+    rate = jnp.zeros_like(first) if "acceleration_limit" in params else None
+    return jax.lax.scan(step, (first, first, rate), (held, sent))[1]
 
 
 def held_command(
@@ -226,29 +222,6 @@ def _limits(params: Params) -> Limits:
     acceleration = _value(params, "acceleration_limit", "acceleration_rad_s2", jnp.inf)
     speeds = jnp.minimum(both, up), jnp.minimum(both, down)
     return Limits(speeds, acceleration)
-
-
-def _pursuit(command, last, goal, speeds, h):
-    """Moves at a limited speed towards a goal that moves evenly from `last` to `goal`.
-
-    Where the goal comes to meet it, the command turns round with it within the step.
-    """
-    gap = last - command
-    speed = towards(jnp.where(gap == 0.0, goal - last, gap), *speeds)
-    reach = speed * h
-    closing = reach - jnp.sign(gap) * (goal - last)
-    ends = closing > 0.0
-    part = jnp.clip(jnp.abs(gap) / _chosen(ends, closing, 1.0), 0.0, 1.0)
-    part = _chosen(ends, part, 1.0 * (gap != 0.0))
-    met = command + jnp.sign(gap) * _chosen(part > 0.0, part * reach, 0.0)
-    speed = towards(goal - met, *speeds)
-    there = limited(met, goal, speed, jnp.maximum(1.0 - part, 0.0) * h)
-    return _chosen(jnp.isfinite(speed), there, goal)
-
-
-def _chosen(condition, one, other) -> Array:
-    """Chooses by element; what is not chosen may be infinite."""
-    return jnp.asarray(jnp.where(condition, one, other))
 
 
 def read_late(

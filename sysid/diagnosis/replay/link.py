@@ -16,6 +16,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from envs.actuator.effects.compliance import DAMPING
+from envs.actuator.trigonometry import sine_cosine
 
 MOST_ROTOR = 0.9
 """Largest share of a joint's inertia that is on the motor's side."""
@@ -126,7 +127,8 @@ def _spring(state: State, force: Float[Array, "p c"], link: Link, dt: float) -> 
     away = x - force * lag
     turn = jnp.sqrt(1.0 - DAMPING**2) * omega
     fade = jnp.exp(-DAMPING * omega * dt)
-    cosine, sine = jnp.cos(turn * dt), jnp.sin(turn * dt) / turn
+    sine, cosine = sine_cosine(turn * dt)
+    sine = sine / turn
     lead = speed + DAMPING * omega * away
     pull = omega**2 * away + DAMPING * omega * speed
     return (

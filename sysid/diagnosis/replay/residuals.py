@@ -28,7 +28,7 @@ from envs.actuator.effect import Substep
 from sysid.diagnosis.replay import cascade, link
 from sysid.diagnosis.replay.band import band, smooth
 from sysid.diagnosis.replay.beside import beside
-from sysid.diagnosis.replay.command import command_path
+from sysid.diagnosis.replay.command import commands_of
 from sysid.diagnosis.replay.model import (
     Candidates,
     Nuisance,
@@ -94,8 +94,8 @@ class Torques:
 @partial(jax.jit, static_argnames=("dt", "names"))
 def equation_error(
     track: Track,
-    params: dict[str, dict[str, Float[Array, " c"]]],
-    nuisance: Nuisance,
+    paths: Float[Array, "c k t p"],
+    values: tuple[dict[str, dict[str, Float[Array, " c"]]], Nuisance],
     friction_speed: Float[Array, ""],
     dt: float,
     names: tuple[str, ...],
@@ -117,8 +117,9 @@ def equation_error(
 
     Args:
         track: the measured motion.
-        params: values of the parameters of the effects by name, in their units.
-        nuisance: the other parameters.
+        paths: what the servo follows, see `commands_of` [rad].
+        values: of the parameters of the effects by name, in their units, and of the
+            other parameters.
         friction_speed: speed below which a joint may be at rest [rad/s].
         dt: step of the grid [s].
         names: effects in the order of the chain.
@@ -131,9 +132,8 @@ def equation_error(
         Exciting trajectories for the identification of base inertial parameters of
         robots, 1992. The division by A is ours.
     """
-    commands = command_path(track.held, track.sent, params, dt)
-    candidates = make_candidates(track, params, nuisance, dt, names)
-    rows = rows_of(track, commands, dt)
+    candidates = make_candidates(track, *values, dt, names)
+    rows = rows_of(track, commands_of(paths), dt)
     start = _start(candidates, jax.tree.map(lambda v: v[0], rows))
     step = partial(_step, candidates, friction_speed)
     torques = jax.lax.scan(step, start, rows)[1]

@@ -7,6 +7,7 @@ import jax.numpy as jnp
 from jaxtyping import Array, Float
 
 from envs.actuator.surroundings import Gravity, Surroundings
+from envs.actuator.trigonometry import sine_cosine
 from sysid.diagnosis.replay.motion import Motion, Track
 
 
@@ -77,5 +78,5 @@ def turned(
         Rodrigues' rotation formula.
     """
     hinge = jnp.sum(axis**2, -1, keepdims=True)
-    cosine = 1.0 - hinge * (1.0 - jnp.cos(angle))
-    return cosine * v + jnp.sin(angle) * jnp.cross(axis, v)
+    sine, cosine = sine_cosine(angle)
+    return (1.0 - hinge * (1.0 - cosine)) * v + sine * jnp.cross(axis, v)

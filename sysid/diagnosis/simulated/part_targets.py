@@ -15,17 +15,10 @@ from jaxtyping import Array, Float
 
 from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
-from sysid.diagnosis.replay.command import (
-    EFFECTS,
-    Params,
-    command_path,
-    held_command,
-)
+from sysid.diagnosis.fits.paths import Names, Values, path_rows, path_values
+from sysid.diagnosis.replay.command import Params, command_path, held_command
 from sysid.diagnosis.replay.motion import Track
 from sysid.diagnosis.side_by_side import side_by_side
-
-Values = dict[str, dict[str, Float[np.ndarray, " c"]]]
-"""Values of parameters of candidates c, by effect and name."""
 
 NEAR = 1e-3
 """Share of a part by which a target may miss it, of rounding."""
@@ -52,13 +45,10 @@ def part_targets(
     Source:
         Ours.
     """
-    names = [(e, name) for e in EFFECTS if e in params for name in params[e]]
-    rows = np.stack([np.asarray(params[e][name]) for e, name in names], 1)
+    names, rows = path_rows(params)
 
     def batch(slots: int, lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
-        some: Values = {}
-        for (effect, name), column in zip(names, lanes.T, strict=True):
-            some.setdefault(effect, {})[name] = column
+        some = path_values(names, lanes)
         return lanes_first(_walked(track, some, dt, parts, slots, moves), count)
 
     def walked(new: np.ndarray) -> np.ndarray:
@@ -76,7 +66,7 @@ def part_targets(
     return remembered(known, rows, walked)
 
 
-def _moves(names: list[tuple[str, str]], rows: np.ndarray) -> np.ndarray:
+def _moves(names: Names, rows: np.ndarray) -> np.ndarray:
     """Where a command depends on where it was."""
     limits = [i for i, (effect, _) in enumerate(names) if effect in MOVING]
     return np.any(np.isfinite(rows[:, limits]), axis=1)
@@ -107,7 +97,7 @@ def _walked(
         for x in (held, ages)
     )
     if moves:
-        mean = command_path(held, sent, params, dt).mean
+        mean = command_path(held, sent, params, dt, False).mean
     else:
         mean = held_command(held, sent, params, dt)
     return mean.reshape(-1, parts, *mean.shape[1:])
