@@ -14,7 +14,7 @@ from typing import Any
 
 from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
-from fingers_mjx.cli.sysid.transfer import show
+from fingers_mjx.cli.sysid.transfer import print_gains
 from fingers_mjx.studies.transfer import gains
 
 
@@ -26,7 +26,8 @@ def joined(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
 
     Raises:
         InputError: parts that were not compared alike: in other hands or episodes, of
-            another task or budget.
+            another task or budget; or a policy that is there twice, which is no seed
+            more.
     """
     (first, one), *others = parts.items()
     for name, other in others:
@@ -44,6 +45,10 @@ def joined(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         arm: [x for part in documents for x in part["policies"][arm]]
         for arm in one["policies"]
     }
+    for arm, every in policies.items():
+        known = [one["policy_sha256"] for one in every]
+        if len(set(known)) < len(known):
+            raise InputError(arm, "policies", "one of them twice", "each one once")
     seeds = list(range(sum(len(part["seeds"]) for part in documents)))
     task = policies["default"][0]["task"]
     return {
@@ -58,7 +63,8 @@ def _alike(part: Mapping[str, Any]) -> tuple[object, ...]:
     """What has to be the same in all parts."""
     every = [policy for arm in part["policies"].values() for policy in arm]
     facts = {tuple(one[k] for k in ("task", "seed", "steps_trained")) for one in every}
-    return (sorted(part["conditions"].items()), sorted(facts))
+    measures, arms = sorted(part["gain"]), sorted(part["policies"])
+    return (sorted(part["conditions"].items()), sorted(facts), measures, arms)
 
 
 def main(words: Sequence[str] | None = None) -> None:
@@ -68,7 +74,7 @@ def main(words: Sequence[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, required=True, metavar="FILE")
     args = parser.parse_args(words)
     document = joined({str(path): json.loads(path.read_text()) for path in args.parts})
-    show(document)
+    print_gains(document)
     write_atomic(args.out, json.dumps(document, indent=2, allow_nan=False))
 
 

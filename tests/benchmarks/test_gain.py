@@ -14,7 +14,7 @@ POLICY = {"task": "crawl", "seed": 0, "steps_trained": 100}
 
 
 def part(seeds, generator=None, **changed):
-    """A comparison of policies whose means are drawn."""
+    """A comparison of policies whose means and names are drawn."""
     generator = generator or np.random.default_rng(0)
     measures = ("task_speed_mps", "drift_deg_s", "survival")
     values: dict[str, dict[str, list]] = {
@@ -26,7 +26,10 @@ def part(seeds, generator=None, **changed):
     values["survival"]["extended"][0] = None
     return {
         "seeds": list(seeds),
-        "policies": {arm: [POLICY | changed for _ in seeds] for arm in ARMS},
+        "policies": {
+            arm: [POLICY | changed | {"policy_sha256": name} for name in names]
+            for arm, names in zip(ARMS, generator.random((2, len(seeds))), strict=True)
+        },
         "gain": gains(values, seeds, "crawl"),
         "conditions": {"episodes": 64, "steps": 500, "real_sha256": "a"},
     }
@@ -58,6 +61,18 @@ def test_parts_that_were_not_compared_alike_are_refused(field):
         joined({"a": part(range(2)), "b": other})
 
 
+def test_a_policy_that_is_there_twice_is_no_second_seed():
+    with pytest.raises(InputError, match="default: policies: found one of them twice"):
+        joined({"a": part(range(2)), "b": part(range(2))})
+
+
+def test_parts_with_other_measures_are_refused():
+    other = part(range(2), np.random.default_rng(1))
+    del other["gain"]["survival"]
+    with pytest.raises(InputError, match="as in a"):
+        joined({"a": part(range(2)), "b": other})
+
+
 def test_another_hand_is_refused():
     other = part(range(2))
     other["conditions"]["real_sha256"] = "b"
@@ -66,8 +81,10 @@ def test_another_hand_is_refused():
 
 
 def test_the_command_shows_and_writes_it(tmp_path, capsys):
+    generator = np.random.default_rng(2)
     for name in "ab":
-        (tmp_path / f"{name}.json").write_text(json.dumps(part(range(2))))
+        document = json.dumps(part(range(2), generator))
+        (tmp_path / f"{name}.json").write_text(document)
     out = tmp_path / "whole.json"
     main([str(tmp_path / "a.json"), str(tmp_path / "b.json"), "--out", str(out)])
     assert "trainings on each: 4" in capsys.readouterr().out

@@ -133,7 +133,7 @@ def run(args: argparse.Namespace) -> int:
     args.out.mkdir(parents=True, exist_ok=True)
     text = json.dumps(document, indent=2, allow_nan=False)
     write_atomic(args.out / "transfer.json", text)
-    show(document)
+    print_gains(document)
     return 0
 
 
@@ -186,7 +186,7 @@ def _check_alike(sources: list[PolicySource]) -> None:
                 raise InputError(other.path, what, b, f"{a}, as the first policy")
 
 
-def show(document: dict[str, Any]) -> None:
+def print_gains(document: dict[str, Any]) -> None:
     """Prints the comparison.
 
     Args:

@@ -14,7 +14,7 @@ from sysid.diagnosis.fits.lanes import FEW_LANES, in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.fits.paths import command_paths
-from sysid.diagnosis.replay.motion import JointTrack, Track
+from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.side_by_side import side_by_side
 
@@ -26,22 +26,23 @@ class Evaluated:
     Attributes:
         paths: of targets, by the parameters of the path.
         errors: of candidates along the track, both residuals.
-        track: with its noise; along another one all errors are others.
+        data: the track with its noise; along another one all errors are others. The
+            targets and the meaning of coordinates are the joint's, and stay.
     """
 
     paths: Memory = field(default_factory=dict)
     errors: Memory = field(default_factory=dict)
-    track: Track | None = None
+    data: JointTrack | None = None
 
-    def along(self, track: Track) -> Memory:
+    def along(self, data: JointTrack) -> Memory:
         """Returns the errors along a track, and forgets those along another."""
-        if self.track is not track:
-            self.track, self.errors = track, {}
+        if self.data is not data:
+            self.data, self.errors = data, {}
         return self.errors
 
     def forget(self) -> None:
         """Forgets all: the joints of a hand would fill the memory."""
-        self.paths, self.errors, self.track = {}, {}, None
+        self.paths, self.errors, self.data = {}, {}, None
 
 
 def equation_errors(
@@ -80,4 +81,4 @@ def equation_errors(
             side_by_side([partial(batch, *lanes) for lanes in batches])
         )
 
-    return remembered(evaluated.along(track), thetas, errors)
+    return remembered(evaluated.along(data), thetas, errors)

@@ -18,15 +18,18 @@ Batch = tuple[Shaped[np.ndarray, "l ..."], int]
 def in_lanes(
     candidates: Shaped[np.ndarray, "c ..."], most: int = LANES
 ) -> Iterator[Batch]:
-    """Yields batches of `most`, and of few what is left; each filled up with its first.
+    """Yields batches of one size, the last filled up with its first candidate.
+
+    Of one size, since two programs agree to the last digit but one, and slopes are
+    quotients of differences.
 
     Args:
         candidates: their coordinates [1], or their numbers.
         most: size of a batch of many.
     """
-    while len(candidates):
-        lanes = FEW_LANES if len(candidates) <= 2 * FEW_LANES else most
-        some, candidates = candidates[:lanes], candidates[lanes:]
+    lanes = FEW_LANES if len(candidates) <= 2 * FEW_LANES else most
+    for first in range(0, len(candidates), lanes):
+        some = candidates[first : first + lanes]
         filled = np.repeat(some[:1], lanes - len(some), 0)
         yield np.concatenate([some, filled]), len(some)
 

@@ -1,4 +1,4 @@
-"""Candidates that were simulated before are not simulated again.
+"""Candidates that were evaluated before are not evaluated again.
 
 Fits that go on from where others ended, or begin at one place with several sets of
 effects, ask for the same again: a quarter of all. A result counts for one program only,

@@ -41,12 +41,12 @@ class Commands:
 
     Attributes:
         path: at the steps of the grid, just before targets that arrive then [rad].
-        mean: over the step that ends there [rad].
+        mean: over the step that ends there [rad]; NaN where nobody asks.
         ripple: mean about a step less what a smooth curve through the path would have
             there: a servo that is read as often as targets come is always sampled at
             the same phase of their sawtooth [rad].
         ahead: how far the path still goes at the times `WITHIN` until the end of the
-            step [rad].
+            step [rad]; one zero in the place of all k where nobody asks.
     """
 
     path: Float[Array, "t p c"]
@@ -112,7 +112,7 @@ def paths_of(made: Commands) -> Float[Array, "k t p c"]:
 def commands_of(paths: Float[Array, "c k t p"]) -> Commands:
     """The same commands again, without a mean: `paths_of`, its candidates in front."""
     path, ripple, *ahead = jnp.moveaxis(paths, 0, -1)
-    return Commands(path, path, ripple, jnp.stack(ahead, 1))
+    return Commands(path, jnp.full_like(path, jnp.nan), ripple, jnp.stack(ahead, 1))
 
 
 def _walk(

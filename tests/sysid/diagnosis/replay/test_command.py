@@ -123,6 +123,24 @@ def test_company_changes_no_candidate():
         assert np.asarray(a) == pytest.approx(np.asarray(b), abs=1e-6)
 
 
+@pytest.mark.parametrize("beside", [5.0, 0.5])
+def test_a_way_has_parts_of_its_own_whatever_low_pass_is_beside_it(beside):
+    """A low-pass is followed in parts of a step, and a goal that is held in one."""
+    targets = np.where(ROWS % 100 < 50, 1.0, 0.0)
+    held, sent = held_targets(DT * ROWS, targets, DT * ROWS, 4)
+    rows = jnp.array(held[..., None]), jnp.array(sent[..., None])
+
+    def path(*cutoffs):
+        cutoff = {"cutoff_hz": jnp.array(cutoffs)}
+        limits = {"acceleration_rad_s2": jnp.full(len(cutoffs), 10.0)}
+        effects = {"lowpass_cutoff": cutoff, "acceleration_limit": limits}
+        return np.asarray(command_path(*rows, effects, 4.0 * DT).path)
+
+    both = path(jnp.inf, beside)
+    assert np.array_equal(both[..., 0], path(jnp.inf, jnp.inf)[..., 0])
+    assert np.array_equal(both[..., 1], path(beside, beside)[..., 1])
+
+
 @pytest.mark.parametrize("delay_rows", [0.0, 0.4, 2.7])
 def test_without_a_limit_the_mean_needs_no_path(delay_rows):
     """Rounded, late and of a drifting clock; a limit of speed is not seen."""

@@ -62,7 +62,8 @@ def _gains(monkeypatch):
 
 def says(judge, before=1.0, after=1.0):
     """Its verdict on models that leave so much of the equations' errors."""
-    models = [SimpleNamespace(errors=np.array([1.0, x])) for x in (before, after)]
+    errors = [np.array([1.0, x]) for x in (before, after)]
+    models = [SimpleNamespace(effects=(), errors=x) for x in errors]
     models[1].gain = judge.gain
     return judge.confirms(*models)
 
@@ -90,7 +91,8 @@ def test_a_difference_that_is_sure_but_small_is_no_cause():
     assert says(Said(ENOUGH, 9.0, fall=1.1 * LEAST_FALL))
     small = Said(ENOUGH, 9.0, fall=0.9 * LEAST_FALL)
     assert not says(small)
-    nothing, cause = (SimpleNamespace(errors=np.ones(2), gain=ENOUGH) for _ in range(2))
+    said = {"effects": (), "errors": np.ones(2), "gain": ENOUGH}
+    nothing, cause = (SimpleNamespace(**said) for _ in range(2))
     assert small.prefers(nothing, cause)  # beside a cause that counts
 
 

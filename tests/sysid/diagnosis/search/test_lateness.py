@@ -1,6 +1,5 @@
 """A late target and a late reading, fitted from as late as each other."""
 
-import numpy as np
 import pytest
 from support.plain_servo import problem_with
 
@@ -49,4 +48,3 @@ def test_a_stage_leaves_neither_far_behind(problem):
     (delay, latency) = (costs[(name,)] for name in LATE)
     assert delay < 0.1 * smaller.fit.cost
     assert latency == pytest.approx(delay, rel=0.5)
-    assert np.isfinite(latency)

@@ -129,6 +129,27 @@ def test_a_search_runs_again_where_tolerances_are_strained(
     assert runs == 1 or seen[-1].left.tolist() == [5.0, 5.0]
 
 
+@pytest.mark.parametrize("lost", [True, False])
+def test_a_second_search_that_loses_the_angle_is_not_the_answer(monkeypatch, lost):
+    fit = SimpleNamespace(theta=np.zeros(1))
+    base = SimpleNamespace(penalty=0.0, fit=fit)
+    best = SimpleNamespace(effects=("backlash",), fit=fit)
+    problem = SimpleNamespace(repeat=False, raw=lambda theta: [np.full(2, 3.0)])
+    problem.with_remaining = lambda left: problem
+    results = [SimpleNamespace(best=best, base=base, problem=problem) for _ in range(2)]
+    left = iter(results)
+    monkeypatch.setattr(searching, "settled", lambda p: (p, base))
+    monkeypatch.setattr(searching, "coupled", lambda p, b: p)
+    monkeypatch.setattr(searching, "in_parts", lambda p, b: (p, b))
+    monkeypatch.setattr(searching, "output_problem", lambda p: None)
+    monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
+    monkeypatch.setattr(searching, "_searched", lambda *_: next(left))
+    monkeypatch.setattr(searching, "_by_angle", lambda found: found)
+    monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
+    monkeypatch.setattr(searching, "_loses_angle", lambda *_: lost)
+    assert search(problem) is results[0 if lost else 1]
+
+
 @pytest.mark.parametrize(
     ("first", "second", "gains", "kept"),
     [
