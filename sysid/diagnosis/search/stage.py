@@ -14,7 +14,6 @@ from sysid.diagnosis.fits.origins import near_nominal, with_effects
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.starts import many_optima, starts_of
 from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
-from sysid.diagnosis.search.lateness import as_late
 from sysid.diagnosis.search.presliding import DRY_SHARE, is_dry, repeats_friction
 from sysid.diagnosis.search.selection import MODEL_ERROR, accepted
 from sysid.diagnosis.simulated.output_error import OutputProblem
@@ -47,8 +46,7 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     models = _best(fit_models(problem, sets, starts))
     near = models[:REFINED]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
-    models += fit_models(problem, sets, starts, rounds=CONVERGED)
-    models = _best([*models, *as_late(problem, models)])
+    models = _best([*models, *fit_models(problem, sets, starts, rounds=CONVERGED)])
     return simplest_first(problem, model, _ordered(problem, model, models))
 
 
@@ -165,8 +163,7 @@ def _refined(
     models = fit_models(
         problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=CONVERGED
     )
-    models = [*models, *stage]
-    return _ordered(problem, smaller, _best([*models, *as_late(problem, models)]))
+    return _ordered(problem, smaller, _best([*models, *stage]))
 
 
 def _ordered(problem: Problem, smaller: Model, stage: list[Model]) -> list[Model]:
