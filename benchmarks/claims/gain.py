@@ -46,7 +46,7 @@ def joined(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
         for arm in one["policies"]
     }
     for arm, every in policies.items():
-        known = [one["policy_sha256"] for one in every]
+        known = [policy["policy_sha256"] for policy in every]
         if len(set(known)) < len(known):
             raise InputError(arm, "policies", "one of them twice", "each one once")
     seeds = list(range(sum(len(part["seeds"]) for part in documents)))

@@ -63,7 +63,8 @@ def command_paths(
         Ours.
     """
     names, rows = path_rows(params)
-    kind = np.where(_limited(params, *SLOWEST), 2, 1 * _limited(params, *ASKS))
+    slow, asks = (_limited(params, *name, len(rows)) for name in (SLOWEST, ASKS))
+    kind = np.where(slow, 2, 1 * asks)
     both = np.column_stack([rows, kind.astype(rows.dtype)])
     rows, which = np.unique(both, axis=0, return_inverse=True)
     kind, which = rows[:, -1], which.reshape(-1)
@@ -87,9 +88,10 @@ def command_paths(
     return remembered(known, rows, walked), which
 
 
-def _limited(params: Values, effect: str, name: str) -> Bool[np.ndarray, " c"]:
+def _limited(
+    params: Values, effect: str, name: str, count: int
+) -> Bool[np.ndarray, " c"]:
     """Where an effect limits anything."""
-    count = next(x for v in params.values() for x in v.values()).shape[0]
     return np.isfinite(params[effect][name] if effect in params else [np.inf] * count)
 
 

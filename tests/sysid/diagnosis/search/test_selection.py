@@ -85,6 +85,19 @@ def test_a_time_within_a_servos_cycle_is_no_cause(
     assert accepted(problem, *models, models[0]) == taken
 
 
+def searches_alone(monkeypatch, base, searched, lost=False):
+    """Leaves of a search the order of its runs: what each finds is said here."""
+    monkeypatch.setattr(searching, "settled", lambda p: (p, base))
+    monkeypatch.setattr(searching, "coupled", lambda p, b: p)
+    monkeypatch.setattr(searching, "in_parts", lambda p, b: (p, b))
+    monkeypatch.setattr(searching, "output_problem", lambda p: None)
+    monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
+    monkeypatch.setattr(searching, "_searched", searched)
+    monkeypatch.setattr(searching, "_by_angle", lambda found: found)
+    monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
+    monkeypatch.setattr(searching, "_loses_angle", lambda again, first: lost)
+
+
 @pytest.mark.parametrize(
     ("penalty", "effects", "repeat", "runs"),
     [
@@ -110,15 +123,7 @@ def test_a_search_runs_again_where_tolerances_are_strained(
         seen.append(problem)
         return found
 
-    monkeypatch.setattr(searching, "settled", lambda p: (p, base))
-    monkeypatch.setattr(searching, "coupled", lambda p, b: p)
-    monkeypatch.setattr(searching, "in_parts", lambda p, b: (p, b))
-    monkeypatch.setattr(searching, "output_problem", lambda p: None)
-    monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
-    monkeypatch.setattr(searching, "_searched", searched)
-    monkeypatch.setattr(searching, "_by_angle", lambda found: found)
-    monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
-    monkeypatch.setattr(searching, "_loses_angle", lambda again, first: False)
+    searches_alone(monkeypatch, base, searched)
     assert search(problem) is found
     assert len(seen) == runs
     assert runs == 1 or seen[1].left.tolist() == [3.0, 3.0]
@@ -138,15 +143,7 @@ def test_a_second_search_that_loses_the_angle_is_not_the_answer(monkeypatch, los
     problem.with_remaining = lambda left: problem
     results = [SimpleNamespace(best=best, base=base, problem=problem) for _ in range(2)]
     left = iter(results)
-    monkeypatch.setattr(searching, "settled", lambda p: (p, base))
-    monkeypatch.setattr(searching, "coupled", lambda p, b: p)
-    monkeypatch.setattr(searching, "in_parts", lambda p, b: (p, b))
-    monkeypatch.setattr(searching, "output_problem", lambda p: None)
-    monkeypatch.setattr(searching, "fit_models", lambda *_: [base])
-    monkeypatch.setattr(searching, "_searched", lambda *_: next(left))
-    monkeypatch.setattr(searching, "_by_angle", lambda found: found)
-    monkeypatch.setattr(searching, "_with_first", lambda again, first: again)
-    monkeypatch.setattr(searching, "_loses_angle", lambda *_: lost)
+    searches_alone(monkeypatch, base, lambda *_: next(left), lost)
     assert search(problem) is results[0 if lost else 1]
 
 
