@@ -34,6 +34,7 @@ MEMBERS = {
     "steering_task_speed": (2, 2),
     "steering_all_dearer": (2, 2),
     "steering_turns_kept": (2, 2),
+    "steering_quieter": (2, 2),
     "diagnosis_gain": (3, 8),
     "budget_fourth": (2, 6),
 }
