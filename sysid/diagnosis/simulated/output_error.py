@@ -22,7 +22,7 @@ from sysid.diagnosis.likelihood.whitening import (
     correlation_time,
 )
 from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
-from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S
+from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
 from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
 
 FAR = 1e3
@@ -37,6 +37,8 @@ class OutputProblem(Problem):
         equations: the residuals from which its candidates come.
         stages: candidates that came from them, by the effects of the smaller model.
         seen: what was simulated; see `closed_loop`.
+        push_shares: how much is lost of what may be of pushes as they are sampled, and
+            as they are read [1].
     """
 
     channels: ClassVar[tuple[str, str]] = ("", "position")
@@ -47,6 +49,7 @@ class OutputProblem(Problem):
     equations: Problem | None = None
     stages: dict[tuple[str, ...], list] = field(default_factory=dict)
     seen: Known = field(default_factory=Known)
+    push_shares: tuple[float, float] = (1.0, 1.0)
 
     @property
     def reading_noise(self) -> float:
@@ -97,14 +100,11 @@ class OutputProblem(Problem):
         Source:
             Ours; as `Problem.with_noise`.
         """
-        valid, rows = self.valid[1], sample_rows(len(self.data.track.cmd))
-        speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
-        late = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
-        timed, between = np.hypot(late, self._pushed()[rows]), self._unread()[rows]
+        valid, size = self.valid[1], self.noise_of(raw)
+        late, between, *pushed = self.unsure()
+        timed = np.hypot(late, np.hypot(*pushed))
         unsure = np.hypot(timed, between)
         if self.repeat:
-            series, counts = self.repeat.differences(raw[1], valid)
-            size = bulk_deviation(series[counts]) if counts.any() else 1.0
             alike = 1.0 / np.hypot(1.0, timed / size)
             weight = 1.0 / np.hypot(1.0, unsure / size)
             # Repeats jitter each in its own way: a weight of both for their difference.
@@ -114,17 +114,43 @@ class OutputProblem(Problem):
             series, counts = self.repeat.differences(alike * raw[1], valid)
             noise = autoregressive(shared * series, counts)
         else:
-            readings = np.array([self.reading_noise**2, 0.0, 0.0])
-            size = difference_noise(raw[1], valid, readings, band_steps=0.0)
             weight = 1.0 / np.hypot(1.0, unsure / size)
             noise = Noise(np.zeros(0), size)
         weights = np.stack([np.ones_like(weight), weight])
         return replace(self, noise=(self.noise[0], noise), weight=weights)
 
-    def _pushed(self) -> Float[np.ndarray, "t p"]:
-        """Returns how far pushes of others, as sampled, may lead the angle astray."""
-        kp = np.asarray(self.data.track.kp, float)
-        return self.data.pushed / np.maximum(kp, 1e-12)
+    def noise_of(self, raw: Float[np.ndarray, "2 m p"]) -> float:
+        """Noise of the angle's error where its times are known [rad].
+
+        Args:
+            raw: errors of one candidate, without weights [rad].
+        """
+        valid = self.valid[1]
+        if not self.repeat:
+            readings = np.array([self.reading_noise**2, 0.0, 0.0])
+            return difference_noise(raw[1], valid, readings, band_steps=0.0)
+        series, counts = self.repeat.differences(raw[1], valid)
+        return bulk_deviation(series[counts]) if counts.any() else 1.0
+
+    def unsure(self) -> Float[np.ndarray, "4 m p"]:
+        """How far the angle is uncertain, each for itself [rad].
+
+        By a servo's cycle, between its rows, and by pushes of others as they are
+        sampled and as they are read.
+        """
+        rows = sample_rows(len(self.data.track.cmd))
+        speed = np.abs(np.asarray(self.data.track.vel, float)[rows])
+        late = CYCLE_S * maximum_filter1d(speed, 3, axis=0)
+        return np.stack([late, self._unread()[rows], *self._pushed()[:, rows]])
+
+    def _pushed(self) -> Float[np.ndarray, "2 t p"]:
+        """Returns how far pushes, as sampled and as read, may lead the angle astray."""
+        kp = np.maximum(np.asarray(self.data.track.kp, float), 1e-12)
+        whole = self.data.pushed
+        sampled = sampling_uncertainty(np.asarray(self.data.track.push, float))
+        sampled = np.minimum(sampled, whole)
+        parts = np.stack([sampled, np.sqrt(whole**2 - sampled**2)]) / kp
+        return np.array(self.push_shares)[:, None, None] * parts
 
     def _unread(self) -> Float[np.ndarray, "t p"]:
         """Returns what smoothing leaves of the error between rows, √(Σ_k w_k² u_k²)."""

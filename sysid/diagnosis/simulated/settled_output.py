@@ -6,6 +6,7 @@ from sysid.diagnosis.fits.candidate import CONVERGED, Model, fit_models
 from sysid.diagnosis.fits.clock import without_drift
 from sysid.diagnosis.fits.origins import at_nominal, near_nominal
 from sysid.diagnosis.simulated.output_error import OutputProblem
+from sysid.diagnosis.simulated.push_share import shown_pushes
 
 
 def settled_output(
@@ -26,10 +27,16 @@ def settled_output(
     starts = np.stack([*begin, fitted])
     raw = output.raw(starts, weigh=False)
     nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
-    problem = output.with_noise(without_drift(output, nearest))
+    problem = _with_noise(output, nearest)
     models = fit_models(
         problem, [effects] * len(starts), list(starts), rounds=CONVERGED
     )
     theta = min(models, key=lambda m: m.fit.cost).fit.theta
-    problem = output.with_noise(without_drift(output, theta))
-    return problem, fit_models(problem, [effects], [theta])[0]
+    problem = _with_noise(output, theta)
+    return problem, fit_models(problem, [effects], [theta], rounds=CONVERGED)[0]
+
+
+def _with_noise(output: OutputProblem, theta: np.ndarray) -> OutputProblem:
+    """Estimates the noise of what a model leaves, with what it shows of pushes."""
+    raw = without_drift(output, theta)
+    return shown_pushes(output, raw).with_noise(raw)
