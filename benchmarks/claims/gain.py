@@ -8,6 +8,7 @@ writes it.
 
 import argparse
 import json
+import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,8 @@ from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_mjx.cli.sysid.transfer import print_gains
 from fingers_mjx.studies.transfer import gains
+
+FIELDS = ("conditions", "gain", "policies", "seeds")
 
 
 def joined(parts: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
@@ -67,16 +70,40 @@ def _alike(part: Mapping[str, Any]) -> tuple[object, ...]:
     return (sorted(part["conditions"].items()), sorted(facts), measures, arms)
 
 
-def main(words: Sequence[str] | None = None) -> None:
+def read(path: Path) -> dict[str, Any]:
+    """Reads one comparison.
+
+    Raises:
+        InputError: no such file, or one that `fingers sysid transfer --policies` did
+            not write.
+    """
+    valid = "a transfer.json of `fingers sysid transfer --policies`"
+    try:
+        document = json.loads(path.read_text("utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(path, "", error, valid) from error
+    found = sorted(document) if isinstance(document, dict) else type(document).__name__
+    missing = [name for name in FIELDS if name not in found]
+    if missing:
+        raise InputError(path, missing[0], f"only {found}", valid)
+    return document
+
+
+def main(words: Sequence[str] | None = None) -> int:
     """Joins the files of the command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("parts", type=Path, nargs="+", metavar="transfer.json")
     parser.add_argument("--out", type=Path, required=True, metavar="FILE")
     args = parser.parse_args(words)
-    document = joined({str(path): json.loads(path.read_text()) for path in args.parts})
+    try:
+        document = joined({str(path): read(path) for path in args.parts})
+    except InputError as error:
+        print(f"gain: {error}", file=sys.stderr)
+        return 2
     print_gains(document)
     write_atomic(args.out, json.dumps(document, indent=2, allow_nan=False))
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

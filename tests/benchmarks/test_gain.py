@@ -89,3 +89,23 @@ def test_the_command_shows_and_writes_it(tmp_path, capsys):
     main([str(tmp_path / "a.json"), str(tmp_path / "b.json"), "--out", str(out)])
     assert "trainings on each: 4" in capsys.readouterr().out
     assert json.loads(out.read_text())["seeds"] == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        (None, "found"),
+        ("no JSON", "found"),
+        ("[1]", "conditions: found only list"),
+        ('{"seeds": [], "gain": {}}', "conditions: found only"),
+    ],
+)
+def test_a_file_that_is_no_comparison_is_refused_by_name(tmp_path, capsys, text, said):
+    path = tmp_path / "transfer.json"
+    if text is not None:
+        path.write_text(text)
+    assert main([str(path), "--out", str(tmp_path / "whole.json")]) == 2
+    error = capsys.readouterr().err
+    assert f"gain: {path}" in error and said in error
+    assert "transfer.json of `fingers sysid transfer --policies`" in error
+    assert len(error.splitlines()) == 1
