@@ -17,7 +17,7 @@ from dataclasses import replace
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Bool, Float
 
 from sysid.diagnosis.replay.motion import Motion
 
@@ -31,6 +31,20 @@ BESIDE = (
 Params = Mapping[str, Mapping[str, Float[Array | np.ndarray, " c"]]]
 """Values of parameters of candidates c, by effect and name."""
 
+LATE = (("sensor_latency", "latency_s"), ("clock_drift", "drift_ppm"))
+"""Age of the readings and drift of their clock, by effect."""
+
+
+def are_late(params: Params, count: int) -> Bool[np.ndarray, " c"]:
+    """Returns whether the readings of candidates have an age at any time.
+
+    Args:
+        params: values of the parameters by effect; effects may be missing.
+        count: number of candidates.
+    """
+    own = [np.asarray(params[e][name]) for e, name in LATE if e in params]
+    return np.any([np.zeros(count), *own], axis=0)
+
 
 def ages(params: Params, dt: float) -> Float[Array, "2 c"]:
     """Age L of the readings of candidates [steps], and its growth d per step [1].
@@ -42,11 +56,7 @@ def ages(params: Params, dt: float) -> Float[Array, "2 c"]:
     none = {"latency_s": 0.0, "drift_ppm": 0.0}
     count = next(x for v in params.values() for x in v.values()).shape[0]
     late, drift = (
-        jnp.broadcast_to(params.get(effect, none)[name], count)
-        for effect, name in (
-            ("sensor_latency", "latency_s"),
-            ("clock_drift", "drift_ppm"),
-        )
+        jnp.broadcast_to(params.get(effect, none)[name], count) for effect, name in LATE
     )
     return jnp.stack([late / dt, 1e-6 * drift])
 

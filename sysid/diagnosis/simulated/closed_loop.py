@@ -23,7 +23,7 @@ from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.replay import band, cascade
-from sysid.diagnosis.replay.beside import ages, beside
+from sysid.diagnosis.replay.beside import ages, are_late, beside
 from sysid.diagnosis.replay.effects import ENTER
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, with_candidates
@@ -58,11 +58,11 @@ class Known:
     """What has been simulated of one track.
 
     Attributes:
-        angles: of candidates, by program.
+        angles: of candidates, by program and whether their readings are late.
         targets: mean targets, by the parameters of their path.
     """
 
-    angles: dict[Program, Memory] = field(default_factory=dict)
+    angles: dict[tuple[Program, bool], Memory] = field(default_factory=dict)
     targets: Memory = field(default_factory=dict)
 
 
@@ -100,14 +100,17 @@ def simulated(
     fixed = (dt / substeps, substeps, window, driven)
 
     walk = dt / substeps * (substeps // means), means, known.targets
-    targets = part_targets(track, problem.space.values(thetas)[0], *walk)
+    params = problem.space.values(thetas)[0]
+    targets = part_targets(track, params, *walk)
+    # What others do is carried once for all where it was measured in time. Beside a
+    # late candidate, one in time would read another first step: they are apart.
+    late = are_late(params, len(thetas))
 
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
         params, nuisance = problem.space.values(thetas[lanes])
         acting = {name: params[name] for name in program}
-        age = ages(params, dt)
-        # What others do is carried once for all where it was measured in time.
-        moved = (targets[lanes], age if np.any(age) else None)
+        age = ages(params, dt) if late[lanes[0]] else None
+        moved = (targets[lanes], age)
         out = _simulated(track, moved, acting, nuisance, program, *fixed)
         return lanes_first(out, count)[:, rows]
 
@@ -116,11 +119,14 @@ def simulated(
         return np.concatenate(side_by_side(batches))
 
     calls, order = [], []
-    for program, who in programs(problem.space, thetas):
-        before = known.angles.setdefault(program, {})
-        evaluate = partial(angles, program, who)
-        calls.append(partial(remembered, before, thetas[who], evaluate))
-        order.append(who)
+    for behind in (False, True):
+        some = np.flatnonzero(late == behind)
+        for program, which in programs(problem.space, thetas[some]):
+            who = some[which]
+            before = known.angles.setdefault((program, behind), {})
+            evaluate = partial(angles, program, who)
+            calls.append(partial(remembered, before, thetas[who], evaluate))
+            order.append(who)
     found = np.concatenate(side_by_side(calls)).astype(float)
     return found[np.argsort(np.concatenate(order))]
 

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import jax.numpy as jnp
 import numpy as np
+import pytest
 from support.plain_servo import problem_with
 
 from sysid.diagnosis.simulated.closed_loop import simulated
@@ -63,3 +64,18 @@ def test_a_simulation_reads_masses_that_others_move_as_late_as_its_joint_is():
     on_time, late = (simulated(problem, late_by(problem, n))[0] for n in (0, STEPS))
     away = late[100 + STEPS :] - on_time[100:-STEPS]
     assert np.abs(away[:-30]).max() < 2e-5
+
+
+@pytest.mark.parametrize(
+    ("effect", "value"), [("sensor_latency", 0.016), ("clock_drift", -300.0)]
+)
+def test_a_late_candidate_changes_none_in_time(effect, value):
+    """Not by a bit: a fit's slopes are differences, and may lead it elsewhere."""
+    problem = problem_with(row_s=0.004)
+    in_time, late = np.stack([problem.space.nominal] * 2)
+    (where,) = problem.space.of(effect)
+    late[where] = problem.space.slots[where].coordinate(value)
+    together = simulated(problem, np.stack([in_time, late]))
+    alone = [simulated(problem, theta[None])[0] for theta in (in_time, late)]
+    assert np.array_equal(together, alone)
+    assert np.abs(together[1] - together[0]).max() > 1e-5
