@@ -178,6 +178,7 @@ def fit_models(
     starts: Sequence[Float[np.ndarray, " n"]],
     shared: dict | None = None,
     rounds: int = 5,
+    nearest: bool = False,
 ) -> list[Model]:
     """Fits models from given starts and scores them on held-out folds.
 
@@ -189,16 +190,27 @@ def fit_models(
         starts: first coordinates of every model [1].
         shared: columns of the Jacobian that are taken as they are.
         rounds: Levenberg-Marquardt steps.
+        nearest: whether the other fits of the same effects are of no interest: scoring
+            takes as long as several steps.
 
     Returns:
-        One model for every start.
+        One model for every start; or for every set, that with the least cost first.
 
     Source:
         Maximum a-posteriori estimate with Gaussian noise and priors; scores: `heldout`.
     """
     tasks = [task_of(problem, s, t) for s, t in zip(sets, starts, strict=True)]
     fits = fit_all(problem.residual, tasks, rounds, shared=shared)
-    return _scored(problem, sets, tasks, fits)
+    order = _nearest(sets, fits) if nearest else range(len(fits))
+    return _scored(problem, *([x[k] for k in order] for x in (sets, tasks, fits)))
+
+
+def _nearest(sets: Sequence[tuple[str, ...]], fits: Sequence[Fit]) -> list[int]:
+    """Returns the numbers of the best fits of all sets, the least cost first."""
+    best: dict[tuple[str, ...], int] = {}
+    for k in sorted(range(len(fits)), key=lambda k: fits[k].cost):
+        best.setdefault(tuple(sets[k]), k)
+    return list(best.values())
 
 
 def task_of(problem: Problem, effects: tuple[str, ...], start: np.ndarray) -> Task:

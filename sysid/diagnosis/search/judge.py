@@ -137,8 +137,8 @@ class Judge:
             if output is not self.problem:
                 starts = [model.fit.theta, at_nominal(output, model)]
                 sets = [model.effects] * len(starts)
-                fits = fit_models(output, sets, starts, rounds=CONVERGED)
-                fit = min(fits, key=lambda m: m.fit.cost)
+                found = fit_models(output, sets, starts, rounds=CONVERGED, nearest=True)
+                (fit,) = found
             self.fits[id(model)] = (model, refolded(output, fit))
         return self.fits[id(model)][1]
 

@@ -30,5 +30,4 @@ def refitted(problem: Problem, effects: tuple[str, ...], theta: np.ndarray) -> M
             moved = theta.copy()
             moved[i] = max(moved[i] + way * slots[i].prior_sd, slots[i].low)
             starts.append(moved)
-    models = fit_models(problem, [effects] * len(starts), starts)
-    return min(models, key=lambda m: m.fit.cost)
+    return fit_models(problem, [effects] * len(starts), starts, nearest=True)[0]

@@ -43,10 +43,11 @@ def extended(problem: Problem, model: Model) -> list[Model]:
         return _extended(problem, model)
     first = _from_equations(problem, model)
     sets, starts = zip(*output_starts(problem, model, first), strict=True)
-    models = _best(fit_models(problem, sets, starts))
+    models = fit_models(problem, sets, starts, nearest=True)
     near = models[:REFINED]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
-    models = _best([*models, *fit_models(problem, sets, starts, rounds=CONVERGED)])
+    models += fit_models(problem, sets, starts, rounds=CONVERGED)
+    models = _best(models)
     return simplest_first(problem, model, _ordered(problem, model, models))
 
 
@@ -75,9 +76,10 @@ def _extended(problem: Problem, model: Model) -> list[Model]:
     starts = starts_of(problem, model, names)
     jobs = [(s, t) for s, name in zip(sets, names, strict=True) for t in starts[name]]
     shared = dict(zip(model.fit.free.tolist(), model.fit.jacobian.T, strict=True))
-    models = fit_models(problem, [j[0] for j in jobs], [j[1] for j in jobs], shared)
+    sets, begin = [j[0] for j in jobs], [j[1] for j in jobs]
+    models = fit_models(problem, sets, begin, shared, nearest=True)
     alone = _nearest_alone(problem, model, starts)
-    stage = _refined(problem, model, _best(models), alone)
+    stage = _refined(problem, model, models, alone)
     return simplest_first(problem, model, stage)
 
 
@@ -160,9 +162,8 @@ def _refined(
         for m in near
         if m.penalty > OFF_PRIOR_PENALTY
     ]
-    models = fit_models(
-        problem, [j[0] for j in jobs], [j[1] for j in jobs], rounds=CONVERGED
-    )
+    sets, begin = [j[0] for j in jobs], [j[1] for j in jobs]
+    models = fit_models(problem, sets, begin, rounds=CONVERGED, nearest=True)
     return _ordered(problem, smaller, _best([*models, *stage]))
 
 

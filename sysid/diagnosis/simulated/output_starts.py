@@ -95,10 +95,11 @@ def _of_every_size(
     if not sets or smaller.errors.max() <= MUCH:
         return []
     begin = tried(problem, smaller, smaller.fit.theta, PLAY)
-    fits = fit_models(problem, sets * len(begin), begin, rounds=CONVERGED)
-    # On its way through a narrow valley, rounding is enough to lead out of it.
-    nearest = min(fits, key=lambda m: m.fit.cost).fit.theta
-    (ended,) = fit_models(problem, sets, [nearest], rounds=CONVERGED)
+    # On its way through a narrow valley, rounding is enough to lead out of it: again.
+    for _ in range(2):
+        each = sets * len(begin)
+        (ended,) = fit_models(problem, each, begin, rounds=CONVERGED, nearest=True)
+        begin = [ended.fit.theta]
     return [(sets[0], ended.fit.theta)]
 
 

@@ -28,10 +28,9 @@ def settled_output(
     raw = output.raw(starts, weigh=False)
     nearest = starts[np.argmin(np.sum(raw**2, (1, 2, 3)))]
     problem = _with_noise(output, nearest)
-    models = fit_models(
-        problem, [effects] * len(starts), list(starts), rounds=CONVERGED
-    )
-    theta = min(models, key=lambda m: m.fit.cost).fit.theta
+    sets, begin = [effects] * len(starts), list(starts)
+    (model,) = fit_models(problem, sets, begin, rounds=CONVERGED, nearest=True)
+    theta = model.fit.theta
     problem = _with_noise(output, theta)
     return problem, fit_models(problem, [effects], [theta], rounds=CONVERGED)[0]
 

@@ -104,9 +104,9 @@ def test_where_much_is_left_a_play_is_fitted_from_every_size(
     index = problem.space.of("backlash")[0]
     begun = []
 
-    def fitted(problem, sets, starts, rounds):
+    def fitted(problem, sets, starts, rounds, nearest):
         begun.extend(float(theta[index]) for theta in starts)
-        return fit_models(problem, sets, starts, rounds=0)
+        return fit_models(problem, sets, starts, rounds=0, nearest=nearest)
 
     monkeypatch.setattr(module, "fit_models", fitted)
     output_starts(problem, base, proposed)
