@@ -82,10 +82,10 @@ def read(path: Path) -> dict[str, Any]:
         document = json.loads(path.read_text("utf-8"))
     except (OSError, ValueError) as error:
         raise InputError(path, "", error, valid) from error
-    found = sorted(document) if isinstance(document, dict) else type(document).__name__
-    missing = [name for name in FIELDS if name not in found]
+    names = sorted(document) if isinstance(document, dict) else []
+    missing = [name for name in FIELDS if name not in names]
     if missing:
-        raise InputError(path, missing[0], f"only {found}", valid)
+        raise InputError(path, missing[0], f"only {names}", valid)
     return document
 
 

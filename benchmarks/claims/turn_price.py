@@ -8,6 +8,7 @@ weighted at the end of the schedules. Who stands is the policy too, shown no com
 """
 
 import argparse
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +20,7 @@ from jaxtyping import Array, Float
 
 from envs.base import State
 from envs.batch import BatchEnv
+from envs.errors import InputError
 from fingers_mjx.evaluation.setups import with_command
 from fingers_mjx.policy.actor import Network, acting_together
 from fingers_mjx.policy.source import PolicySource, load_source
@@ -84,7 +86,14 @@ def _terms(state: State) -> dict[str, Float[Array, ""]]:
 
 
 def rows(source: PolicySource, settings: Sequence[str]) -> list[str]:
-    """Returns the rows of the table, in Markdown."""
+    """Returns the rows of the table, in Markdown.
+
+    Raises:
+        InputError: a policy of another task, or settings that do not fit.
+    """
+    task = source.setup.train.task
+    if task != "crawl":
+        raise InputError("POLICY", "task", task, "crawl, the task with commands")
     setup = overridden(source.setup, [*settings, *GROWN])
     found = []
     for command in COMMANDS:
@@ -102,17 +111,22 @@ def _row(start: str, terms: Mapping[str, float]) -> str:
     return f"| {start} | {' | '.join(f'{x:.1f}' for x in values)} |"
 
 
-def main(words: Sequence[str] | None = None) -> None:
+def main(words: Sequence[str] | None = None) -> int:
     """Prints the table of the command line's policy."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("policy", type=Path, metavar="POLICY")
     parser.add_argument("--set", dest="settings", nargs="+", default=[])
     args = parser.parse_args(words)
     names = ["asked [rad/s]", "hand", "noise", *TRACKING, "rest", "total"]
-    print(f"| {' | '.join(names)} |", "|---" * len(names) + "|", sep="\n")
-    for row in rows(load_source(args.policy), args.settings):
-        print(row, flush=True)
+    try:
+        found = rows(load_source(args.policy), args.settings)
+    except InputError as error:
+        print(f"turn_price: {error}", file=sys.stderr)
+        return 2
+    lines = [f"| {' | '.join(names)} |", "|---" * len(names) + "|", *found]
+    print(*lines, sep="\n")
+    return 0
 
 
 if __name__ == "__main__":
-    main()
+    raise SystemExit(main())

@@ -96,7 +96,7 @@ def test_the_command_shows_and_writes_it(tmp_path, capsys):
     [
         (None, "found"),
         ("no JSON", "found"),
-        ("[1]", "conditions: found only list"),
+        ("[1]", "conditions: found only"),
         ('{"seeds": [], "gain": {}}', "conditions: found only"),
     ],
 )

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from benchmarks.claims.turn_price import COMMANDS_SEEN, GROWN, Acting, earned
+from benchmarks.claims.turn_price import COMMANDS_SEEN, GROWN, Acting, earned, main
 from fingers_mjx.evaluation.setups import with_command
 from fingers_mjx.policy.actor import Policy
 from fingers_mjx.policy.source import load_source
@@ -62,3 +62,12 @@ def test_terms_add_up_and_turning_is_paid(turning):
         assert parts == pytest.approx(terms["total"], abs=1e-2)
     assert turns["track_mean_yaw_rate"] > 2.0 * stands["track_mean_yaw_rate"]
     assert turns["track_planar_velocity"] < stands["track_planar_velocity"]
+
+
+@pytest.mark.parametrize(
+    ("policy", "said"), [("keyboard", "found keyboard"), ("nothing", "nothing")]
+)
+def test_what_is_no_policy_with_commands_is_refused(capsys, policy, said):
+    assert main([str(POLICY.parent / policy)]) == 2
+    error = capsys.readouterr().err
+    assert error.startswith("turn_price: ") and said in error

@@ -47,6 +47,8 @@ def shown_pushes(
         return problem
     if problem.repeat:
         error, valid = problem.repeat.differences(error, valid)
+        if not valid.any():
+            return problem
         squares = np.stack([_of_both(problem, x) for x in squares])
     known = problem.noise_of(raw) ** 2 + squares[:2, valid].sum(0)
     pairs = np.stack(np.meshgrid(SHARES, SHARES), -1).reshape(-1, 2)

@@ -93,6 +93,18 @@ def test_what_repeats_share_is_lost_of_no_push(quiet):
     assert max(shown_pushes(unsure, raw).push_shares) == 1.0
 
 
+def test_repeats_of_which_none_counts_show_no_share(quiet):
+    half = len(quiet.fold) // 2
+    rows = np.arange(len(quiet.fold))[:, None]
+    twin = np.where(rows >= half, 0, -1), np.where(rows >= half, -half, 0).astype(float)
+    repeat = Repeats(*twin, rows % half, 0 * rows)
+    valid = quiet.valid.copy()
+    valid[1, :half] = False
+    unsure = may_lose(quiet, np.ones(len(quiet.data.pushed)))
+    unsure = replace(unsure, repeat=repeat, valid=valid)
+    assert shown_pushes(unsure, noise(quiet, NOISE)).push_shares == (1.0, 1.0)
+
+
 def test_without_pushes_there_is_no_share(quiet):
     assert shown_pushes(quiet, noise(quiet, NOISE)).push_shares == (1.0, 1.0)
 
