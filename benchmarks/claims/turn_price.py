@@ -21,6 +21,7 @@ from jaxtyping import Array, Float
 from envs.base import State
 from envs.batch import BatchEnv
 from envs.errors import InputError
+from envs.observations import HISTORY
 from fingers_mjx.evaluation.setups import with_command
 from fingers_mjx.policy.actor import Network, acting_together
 from fingers_mjx.policy.source import PolicySource, load_source
@@ -30,8 +31,8 @@ from fingers_mjx.runs.setup import make_env
 COMMANDS = ((0.0, 0.0, 0.45), (0.0, 0.0, -0.45))
 NOISE = (0.0, 0.3, 0.6)
 WORLDS, STEPS, SETTLED = 32, 300, 50
-COMMANDS_SEEN = 3 * 8
-"""Entries of the last eight commands, at the end of what the policy sees."""
+COMMANDS_SEEN = 3 * HISTORY
+"""Entries of the commands that are kept, at the end of what the policy sees."""
 TRACKING = (
     "track_planar_velocity",
     "track_mean_planar_velocity",

@@ -201,12 +201,12 @@ def fit_models(
     """
     tasks = [task_of(problem, s, t) for s, t in zip(sets, starts, strict=True)]
     fits = fit_all(problem.residual, tasks, rounds, shared=shared)
-    order = _nearest(sets, fits) if nearest else range(len(fits))
+    order = nearest_fits(sets, fits) if nearest else range(len(fits))
     return _scored(problem, *([x[k] for k in order] for x in (sets, tasks, fits)))
 
 
-def _nearest(sets: Sequence[tuple[str, ...]], fits: Sequence[Fit]) -> list[int]:
-    """Returns the numbers of the best fits of all sets, the least cost first."""
+def nearest_fits(sets: Sequence[tuple[str, ...]], fits: Sequence[Fit]) -> list[int]:
+    """Returns the number of the best fit of every set, the least cost first."""
     best: dict[tuple[str, ...], int] = {}
     for k in sorted(range(len(fits)), key=lambda k: fits[k].cost):
         best.setdefault(tuple(sets[k]), k)

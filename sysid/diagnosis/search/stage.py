@@ -9,6 +9,7 @@ from sysid.diagnosis.fits.candidate import (
     fit_models,
     likelihood_gap,
     log_likelihood_gain,
+    nearest_fits,
 )
 from sysid.diagnosis.fits.origins import near_nominal, with_effects
 from sysid.diagnosis.fits.problem import Problem
@@ -46,17 +47,14 @@ def extended(problem: Problem, model: Model) -> list[Model]:
     models = fit_models(problem, sets, starts, nearest=True)
     near = models[:REFINED]
     sets, starts = [m.effects for m in near], [m.fit.theta for m in near]
-    models += fit_models(problem, sets, starts, rounds=CONVERGED)
-    models = _best(models)
+    models = _best([*models, *fit_models(problem, sets, starts, rounds=CONVERGED)])
     return simplest_first(problem, model, _ordered(problem, model, models))
 
 
 def _best(models: list[Model]) -> list[Model]:
     """Returns the best fit of every set of effects, nearest to the records first."""
-    best: dict[tuple[str, ...], Model] = {}
-    for m in sorted(models, key=lambda m: m.fit.cost):
-        best.setdefault(m.effects, m)
-    return list(best.values())
+    order = nearest_fits([m.effects for m in models], [m.fit for m in models])
+    return [models[k] for k in order]
 
 
 def _from_equations(problem: OutputProblem, model: Model) -> list[Model]:

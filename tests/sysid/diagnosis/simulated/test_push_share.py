@@ -43,6 +43,14 @@ def late(output: OutputProblem) -> np.ndarray:
     return np.arange(len(output.data.pushed)) > len(output.data.pushed) // 2
 
 
+def second_half_again(output: OutputProblem) -> Repeats:
+    """The second half of a record repeats the first."""
+    half = len(output.fold) // 2
+    rows = np.arange(len(output.fold))[:, None]
+    twin = np.where(rows >= half, 0, -1), np.where(rows >= half, -half, 0).astype(float)
+    return Repeats(*twin, rows % half, 0 * rows)
+
+
 def test_what_no_error_shows_is_not_lost(quiet):
     unsure = may_lose(quiet, late(quiet))
     raw = noise(quiet, NOISE)
@@ -79,29 +87,21 @@ def test_pushes_that_are_sampled_well_may_be_read_badly(quiet):
 
 def test_what_repeats_share_is_lost_of_no_push(quiet):
     """A model errs alike in both runs; what a missing row takes it takes from one."""
-    count = len(quiet.fold)
-    half = count // 2
-    rows = np.arange(count)[:, None]
-    twin = np.where(rows >= half, 0, -1), np.where(rows >= half, -half, 0).astype(float)
-    repeat = Repeats(*twin, rows % half, 0 * rows)
+    half = len(quiet.fold) // 2
     unsure = may_lose(quiet, np.ones(len(quiet.data.pushed)))
     raw = noise(quiet, NOISE)
-    raw[1] += 0.02 * np.sin(0.3 * (rows % half))
-    again = replace(unsure, repeat=repeat)
+    raw[1] += 0.02 * np.sin(0.3 * (np.arange(len(quiet.fold))[:, None] % half))
+    again = replace(unsure, repeat=second_half_again(quiet))
     assert again.repeat
     assert max(shown_pushes(again, raw).push_shares) < 0.05
     assert max(shown_pushes(unsure, raw).push_shares) == 1.0
 
 
 def test_repeats_of_which_none_counts_show_no_share(quiet):
-    half = len(quiet.fold) // 2
-    rows = np.arange(len(quiet.fold))[:, None]
-    twin = np.where(rows >= half, 0, -1), np.where(rows >= half, -half, 0).astype(float)
-    repeat = Repeats(*twin, rows % half, 0 * rows)
     valid = quiet.valid.copy()
-    valid[1, :half] = False
+    valid[1, : len(quiet.fold) // 2] = False
     unsure = may_lose(quiet, np.ones(len(quiet.data.pushed)))
-    unsure = replace(unsure, repeat=repeat, valid=valid)
+    unsure = replace(unsure, repeat=second_half_again(quiet), valid=valid)
     assert shown_pushes(unsure, noise(quiet, NOISE)).push_shares == (1.0, 1.0)
 
 
