@@ -2,6 +2,7 @@
 
 import argparse
 
+from envs.errors import InputError
 from fingers_mjx.cli.arguments import options
 
 
@@ -18,25 +19,41 @@ def add(commands) -> None:
         computes=False,
     )
     parser.set_defaults(check=_check)
-    options.path(parser, "run_dir", metavar="RUN", help="run directory")
+    what = "run directory; with --command-gain also a bundle"
+    options.path(parser, "run_dir", metavar="RUN", help=what)
     what = "directory of the bundle; default RUN"
     options.path(parser, "--out", metavar="DIR", help=what)
+    parser.add_argument(
+        "--command-gain",
+        type=options.number(0.1, 10.0),
+        nargs=3,
+        metavar=("VX", "VY", "WZ"),
+        help="show the policy its command times these factors, where it falls short of "
+        "commands; into another directory, --out",
+    )
 
 
 def _check(args: argparse.Namespace) -> None:
     """Refuses what cannot be exported, before JAX loads."""
-    from fingers_mjx.policy.place import check_run
+    from fingers_mjx.policy.place import check_kind, check_run
 
-    check_run(args.run_dir)
+    (check_kind if args.command_gain else check_run)(args.run_dir)
     args.out = args.out or args.run_dir
+    if args.command_gain and args.out.resolve() == args.run_dir.resolve():
+        valid = "another directory: a gain would be applied to a gain"
+        raise InputError("--out", "", args.out, valid)
     options.check_directory("--out", args.out)
 
 
 def run(args: argparse.Namespace) -> int:
     """Exports and prints how far the runtimes are from JAX."""
+    from fingers_mjx.export.command_gain import export_with_gain
     from fingers_mjx.export.run import export_run
 
-    report = export_run(args.run_dir, args.out)
+    if args.command_gain:
+        report = export_with_gain(args.run_dir, args.out, args.command_gain)
+    else:
+        report = export_run(args.run_dir, args.out)
     print(
         f"wrote {args.out}: policy.onnx, manifest.json, config.yaml, hand.yaml\n"
         f"largest difference from JAX over {report.observations:,} observations: "

@@ -3,6 +3,7 @@
 import dataclasses
 import hashlib
 from collections.abc import Iterator, Mapping
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
@@ -45,6 +46,13 @@ def interface_of(env: BatchEnv) -> Interface:
         command_ranges=tuple(pair for term in inputs for pair in term.ranges),
         v_quat_b=stance.q_off,
     )
+
+
+def places(interface: Interface) -> list[tuple[Term, int]]:
+    """Returns the terms of an observation, each with the index of its first entry."""
+    sizes = [term.size * term.history for term in interface.observation.terms]
+    starts = accumulate(sizes[:-1], initial=0)
+    return list(zip(interface.observation.terms, starts, strict=True))
 
 
 def identity(env: BatchEnv) -> dict[str, Any]:

@@ -1,0 +1,59 @@
+"""From a policy to the bundle of one that is shown its command times a gain."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+
+from envs.config.atomic_file import write_atomic
+from fingers_mjx.export.export import ExportReport, export_policy
+from fingers_mjx.export.onnx_graph import PolicyWeights
+from fingers_mjx.export.run import as_bundle
+from fingers_mjx.policy.actor import act
+from fingers_mjx.policy.command_gain import with_command_gain
+from fingers_mjx.policy.source import load_bundle_setup
+from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
+
+
+def export_with_gain(path: Path, out_dir: Path, gain: Sequence[float]) -> ExportReport:
+    """Writes the bundle of a policy that is shown its command times a gain.
+
+    What the policy was trained in and for how long stays; an evaluation of it does not,
+    since it was of the policy without the gain.
+
+    Args:
+        path: run directory, bundle directory or the bundle's ONNX file.
+        out_dir: another directory, made if missing.
+        gain: factor of each entry of the command (`with_command_gain`) [1].
+
+    Raises:
+        InputError: no policy, or one without such a command.
+        BundleError: a bundle that is damaged or made for another hand.
+        ExportError: the exported graph gives other actions than JAX.
+    """
+    with as_bundle(path) as folder:
+        assert folder is not None  # as there is a path
+        bundle, setup = load_bundle_setup(folder)
+        folder = folder if folder.is_dir() else folder.parent
+        beside = {
+            name: (folder / name).read_bytes() for name in (CONFIG_FILE, HAND_FILE)
+        }
+    manifest = bundle.manifest
+    network = with_command_gain(bundle.network, manifest.interface, gain)
+    obs_clip = None if np.isinf(network.obs_clip) else network.obs_clip
+    weights = PolicyWeights(
+        network.layers, network.mean, network.std, network.action_clip, obs_clip
+    )
+    report = export_policy(
+        out_dir,
+        weights,
+        lambda obs: act(network, jnp.asarray(obs)),
+        setup.train.task,
+        manifest.interface,
+        replace(manifest.provenance, evaluation=None),
+    )
+    for name, content in beside.items():
+        write_atomic(out_dir / name, content)
+    return report
