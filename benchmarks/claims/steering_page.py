@@ -9,14 +9,15 @@ from pathlib import Path
 from envs.config.atomic_file import write_atomic
 
 RESULTS = Path("benchmarks/results/steering_planted")
+GAINED = Path("benchmarks/results/command_gain")
 WALKER = Path("benchmarks/results/steering_walker/crawl.json")
 PAGE = Path("docs/results/steering.md")
 FIGURE = Path("docs/images/steering.png")
-TAKEN, FAST = "planted_more-1-steer", "crawl"
-OTHER_GAIN = "planted_more-1-steer-gain-1"
+TAKEN, FAST = "steer", "crawl"
+OTHER_GAIN = "steer-gain-1"
 MEMBERS = ("planted-0", "planted-1", "planted_more-0", "planted_more-1")
 TURNS = ([0.1, 0.0, 0.45], [0.1, 0.0, -0.45], [0.0, 0.0, 0.45], [0.0, 0.0, -0.45])
-FORWARD = [0.16, 0.0, 0.0]
+FORWARD, RIGHT = [0.16, 0.0, 0.0], [0.0, -0.12, 0.0]
 
 
 TEXT = """\
@@ -34,7 +35,7 @@ means with 95 % intervals over episodes.
 
 v_x, v_y and path speed in m/s, turn rates in rad/s. The policy that walks fast turns as
 its gait does, whatever it is asked; the one that steers obeys. To either side it drifts
-forward, and to the right it goes at 0.046 of the 0.12 m/s that it is asked for.
+forward, and to the right it goes at {right} of the 0.12 m/s that it is asked for.
 
 ## Every member of the population
 
@@ -42,8 +43,10 @@ Turn rates for (v_x, v_y, turn rate), and the path speed at full forward:
 
 {members}
 
-Which one was taken, by which rule, and what bars it misses is in the README of
-[the policy](../../fingers_mjx/policies/crawl_steering/README.md).
+`planted_more-1` was taken, and is shown v_x and v_y times 1.2 since
+(`fingers export --command-gain`); the other tables are of what came of that. By which
+rules is in the README of [the
+policy](../../fingers_mjx/policies/crawl_steering/README.md).
 
 ## Headings
 
@@ -66,7 +69,7 @@ python -m benchmarks.claims.steering_page
 
 def read() -> dict[str, dict]:
     """Returns, by name, what `fingers steer --json` wrote of each policy."""
-    files = [*RESULTS.glob("*-steer*.json"), WALKER]
+    files = [*RESULTS.glob("*-steer*.json"), *GAINED.glob("steer*.json"), WALKER]
     return {path.stem: json.loads(path.read_text("utf-8")) for path in files}
 
 
@@ -77,7 +80,9 @@ def page(results: dict[str, dict]) -> str:
         results: what `read` returns.
     """
     tables = {"commands": _commands, "members": _members, "headings": _headings}
-    return TEXT.format(**{k: "\n".join(f(results)) for k, f in tables.items()})
+    aside = _row(results[TAKEN], RIGHT)["vel_y_mps"]["mean"]
+    written = {name: "\n".join(table(results)) for name, table in tables.items()}
+    return TEXT.format(**written, right=f"{-aside:.3f}")
 
 
 def _commands(results: dict[str, dict]) -> list[str]:

@@ -1,0 +1,75 @@
+"""How the gain of the commands is chosen."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from benchmarks.claims.command_gain import (
+    AT_LEAST,
+    AT_MOST,
+    GAINS,
+    chosen,
+    main,
+    measured,
+    missed,
+)
+from fingers_deploy import load_bundle
+from fingers_mjx.policy.command_gain import with_command_gain
+from fingers_mjx.policy.digest import digest
+from fingers_mjx.policy.source import load_source
+
+POLICY = Path("fingers_mjx/policies/crawl_steering")
+PLANTED = Path("benchmarks/claims/policies/steering_planted")
+MEASURED = Path("benchmarks/results/command_gain/gains.json")
+GOOD = AT_LEAST | AT_MOST
+
+
+def test_a_row_on_every_bar_misses_none():
+    assert missed(GOOD) == []
+
+
+@pytest.mark.parametrize("name", AT_LEAST)
+def test_less_than_is_asked_for_misses(name):
+    assert missed(GOOD | {name: 0.999 * GOOD[name]}) == [name]
+
+
+@pytest.mark.parametrize("name", AT_MOST)
+def test_more_than_is_allowed_misses(name):
+    assert missed(GOOD | {name: 1.001 * GOOD[name]}) == [name]
+
+
+@pytest.mark.parametrize("name", GOOD)
+def test_what_is_undefined_misses(name):
+    assert missed(GOOD | {name: float("nan")}) == [name]
+
+
+def test_the_smallest_that_misses_none_is_chosen():
+    bad = GOOD | {"survival": 0.5}
+    rows = [bad | {"gain": 1.0}, GOOD | {"gain": 1.3}, GOOD | {"gain": 1.2}]
+
+    assert chosen(rows) == 1.2
+    assert chosen(rows[:1]) is None
+
+
+def test_the_committed_policy_has_the_gain_that_was_chosen():
+    rows = json.loads(MEASURED.read_text("utf-8"))
+    gain = (chosen(rows), chosen(rows), 1.0)
+    before, after = load_bundle(PLANTED), load_bundle(POLICY)
+
+    wanted = with_command_gain(before.network, before.manifest.interface, gain)
+
+    assert [row["gain"] for row in rows] == list(GAINS)
+    assert digest(after.network) == digest(wanted) != digest(before.network)
+
+
+def test_what_the_bars_are_about_is_measured():
+    found = measured(load_source(POLICY), 8)
+
+    assert set(found) == set(GOOD) | {"task_speed_mps"}
+    assert found["task_speed_low_mps"] < found["task_speed_mps"] < 0.16
+
+
+def test_a_policy_without_commands_is_refused(capsys):
+    assert main(["fingers_mjx/policies/keyboard"]) == 2
+    assert "command of 3 entries" in capsys.readouterr().err
