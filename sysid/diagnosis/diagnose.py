@@ -31,6 +31,7 @@ from sysid.diagnosis.search.shown_beside import (
     with_cause,
 )
 from sysid.diagnosis.side_by_side import side_by_side
+from sysid.diagnosis.simulated.ahead import compiled_ahead
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.verdict.verdict import verdict_of
 from sysid.logs.log import MeasuredLog
@@ -179,7 +180,8 @@ def _examined(
     problem = problem_of(track, logs, mechanism, track.other != track.joint)
     if not problem.valid.any():  # it only moves where the rows cannot follow
         return Examined(track, None, None)
-    result = search(problem)
+    with compiled_ahead(problem):
+        result = search(problem)
     problem.evaluated.forget()
     decided = result.problem
     equations = decided.equations if isinstance(decided, OutputProblem) else decided

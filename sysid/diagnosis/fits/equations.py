@@ -8,15 +8,24 @@ from dataclasses import dataclass, field
 from functools import partial
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from sysid.diagnosis.fits.lanes import FEW_LANES, in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.fits.parameters import Space
-from sysid.diagnosis.fits.paths import command_paths
+from sysid.diagnosis.fits.paths import Values, command_paths
+from sysid.diagnosis.replay.beside import LATE, are_late
+from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
+from sysid.diagnosis.replay.link import are_linked
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.residuals import equation_error
+from sysid.diagnosis.replay.target_path import WITHIN
 from sysid.diagnosis.side_by_side import side_by_side
+
+_LATE = tuple(effect for effect, _ in LATE)
+
+LEFT_OUT = ((*_LATE, *LINK_EFFECTS), _LATE, ())
+"""Effects without which an evaluation takes 0.5, 0.7 and 1 of the time."""
 
 
 @dataclass(eq=False)
@@ -65,20 +74,56 @@ def equation_errors(
     Source:
         Ours.
     """
-    track, speed = data.track, np.float32(data.friction_speed)
+    track = data.track
 
     def errors(new: np.ndarray) -> np.ndarray:
         params, _ = space.values(thetas[new])
         paths, which = command_paths(track, params, data.dt, evaluated.paths)
+        kinds = _kinds(params, len(new))
+        order = np.argsort(-kinds, kind="stable")
 
         def batch(lanes: np.ndarray, count: int) -> np.ndarray:
-            values, fixed = space.values(thetas[new[lanes]]), (speed, data.dt)
-            taken = track, paths[which[lanes]], values
-            return lanes_first(equation_error(*taken, *fixed, space.effects), count)
+            some = paths[which[lanes]], thetas[new[lanes]], kinds[lanes].max()
+            return lanes_first(equation_error(*_arguments(data, space, *some)), count)
 
-        batches = in_lanes(np.arange(len(new)), FEW_LANES)
-        return np.concatenate(
-            side_by_side([partial(batch, *lanes) for lanes in batches])
-        )
+        batches = in_lanes(order, FEW_LANES)
+        calls = [partial(batch, *lanes) for lanes in batches]
+        return np.concatenate(side_by_side(calls))[np.argsort(order)]
 
     return remembered(evaluated.along(data), thetas, errors)
+
+
+def compile_equations(data: JointTrack, space: Space, kind: int) -> None:
+    """Compiles a program, so that `equation_errors` finds it when it first needs it.
+
+    Args:
+        data: the joint's track.
+        space: coordinates.
+        kind: index of what it leaves out in `LEFT_OUT`.
+    """
+    thetas = np.repeat(space.nominal[None], FEW_LANES, 0)
+    shape = FEW_LANES, 2 + len(WITHIN), *data.track.cmd.shape
+    paths = np.zeros(shape, np.float32)
+    equation_error.lower(*_arguments(data, space, paths, thetas, kind)).compile()
+
+
+def _arguments(
+    data: JointTrack,
+    space: Space,
+    paths: Float[np.ndarray, "c k t p"],
+    thetas: Float[np.ndarray, "c n"],
+    kind: int,
+) -> tuple:
+    """Returns what `equation_error` takes for candidates."""
+    names = tuple(e for e in space.effects if e not in LEFT_OUT[kind])
+    values, speed = space.values(thetas), np.float32(data.friction_speed)
+    return (data.track, paths, values, speed, data.dt, names)
+
+
+def _kinds(params: Values, count: int) -> Int[np.ndarray, " c"]:
+    """Returns which program evaluates a candidate: any does that of a larger number.
+
+    Batches are as many as without kinds: each is evaluated as its slowest candidate.
+    """
+    late, linked = are_late(params, count), are_linked(params, count)
+    return np.where(late, len(LEFT_OUT) - 1, 1 * linked)

@@ -120,5 +120,7 @@ def _banded(x: np.ndarray, delay: float, count: int) -> Float[np.ndarray, "c m p
     part = (place - low)[:, None]
     late = (1.0 - part) * x[:, low] + part * x[:, low + 1]
     last = (count - 1) * EVERY + 1
-    parts = [w * late[:, k : k + last : EVERY] for k, w in enumerate(TAPS.tolist())]
-    return np.sum(parts, 0)
+    banded = np.zeros((len(x), count, x.shape[2]))
+    for k, w in enumerate(TAPS.tolist()):
+        banded += w * late[:, k : k + last : EVERY]
+    return banded

@@ -35,10 +35,10 @@ def in_lanes(
 
 
 def lanes_first(found: ArrayLike, count: int) -> Float[np.ndarray, "c ..."]:
-    """Returns the results of the candidates that are asked for, those in front.
+    """Returns the results of the candidates that are asked for, one after the other.
 
     Args:
         found: results of a batch, its candidates last.
         count: number of candidates that are asked for.
     """
-    return np.moveaxis(np.asarray(found), -1, 0)[:count]
+    return np.ascontiguousarray(np.moveaxis(np.asarray(found), -1, 0)[:count])

@@ -39,7 +39,7 @@ def remembered(
     new = {k: i for i, k in reversed(list(enumerate(keys))) if k not in memory}
     if new:
         order = sorted(new.values())
-        found = evaluate(np.array(order)).astype(np.float32)
+        found = evaluate(np.array(order)).astype(np.float32, copy=False)
         memory |= {keys[i]: row for i, row in zip(order, found, strict=True)}
     result = np.stack([memory[k] for k in keys])
     spare = len(memory) - MOST_BYTES // max(memory[keys[0]].nbytes, 1)

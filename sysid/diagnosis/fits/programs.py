@@ -6,7 +6,7 @@ effects in one, every simulation takes five times as long. So most effects, whic
 next to nothing, are always there, and a candidate's program is chosen by the others.
 """
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -54,11 +54,20 @@ def programs(
         shared = [name not in APART for name in COSTLY]
         acting[:, shared] |= acting.any(1, keepdims=True)
         kinds = np.unique(acting, axis=0)
-    chain = [e for e in space.effects if e in KINDS]
     for kind in kinds:
         some = {name for name, there in zip(COSTLY, kind, strict=True) if there}
-        effects = tuple(e for e in chain if e not in COSTLY or e in some)
-        yield effects, np.flatnonzero((acting == kind).all(1))
+        yield program_of(space, some), np.flatnonzero((acting == kind).all(1))
+
+
+def program_of(space: Space, costly: Collection[str]) -> Program:
+    """Returns the program that has some of the costly effects, and all others.
+
+    Args:
+        space: coordinates.
+        costly: names of effects; those that the space lacks do not count.
+    """
+    chain = (e for e in space.effects if e in KINDS)
+    return tuple(e for e in chain if e not in COSTLY or e in costly)
 
 
 def _acts(space: Space, thetas: np.ndarray, effect: str) -> Bool[np.ndarray, " c"]:

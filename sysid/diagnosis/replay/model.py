@@ -11,10 +11,11 @@ from jaxtyping import Array, Float
 from envs.actuator.effect import EffectKind, Params, Substep
 from sysid.diagnosis.measured.resampling import SMOOTH_STEPS
 from sysid.diagnosis.replay.band import EVERY
-from sysid.diagnosis.replay.beside import ages
+from sysid.diagnosis.replay.beside import LATE, ages
 from sysid.diagnosis.replay.cascade import with_cascade
 from sysid.diagnosis.replay.command import Commands
 from sysid.diagnosis.replay.effects import ENTER, READ, RIGID, SLOW
+from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
 from sysid.diagnosis.replay.link import MOST_ROTOR
 from sysid.diagnosis.replay.motion import Motion, Track, motion_of, with_candidates
 from sysid.diagnosis.replay.noise import spring_noise_gain
@@ -78,19 +79,21 @@ class Candidates:
         track: what the pieces have once.
         effects: parameters of the effects in front of the link, in their order.
         nuisance: the other parameters.
+        linked: whether the link of any of them may move against its motor.
         gap_rad, compliance: of the link.
         spring_gain: noise gain of the spring [1].
-        age: of the readings; see `beside.ages`.
+        age: of the readings; see `beside.ages`. None where none is late.
         dt: step of the grid [s].
     """
 
     track: Track
     effects: Mapping[str, Params]
     nuisance: Nuisance
+    linked: bool
     gap_rad: Float[Array, "1 c"]
     compliance: Float[Array, "1 c"]
     spring_gain: Float[Array, "p c"]
-    age: Float[Array, "2 c"]
+    age: Float[Array, "2 c"] | None
     dt: float
 
     @property
@@ -192,7 +195,7 @@ def make_candidates(
         params: values by effect and parameter, in the parameters' units.
         nuisance: the other parameters.
         dt: step of the grid [s].
-        names: effects in the order of the chain.
+        names: effects in the order of the chain; see `residuals.equation_error`.
 
     Returns:
         The candidates, with the noise gains of their springs [1].
@@ -211,8 +214,9 @@ def make_candidates(
     noise = (track.noise[1, 0], track.noise[1, 3], EVERY * dt)
     gain = spring_noise_gain(whole - inner, inner, compliance, *noise)
     nuisance = replace(nuisance, rotor=rotor)
-    age = ages(params, dt)
-    return Candidates(track, wide, nuisance, gap, compliance, gain, age, dt)
+    age = ages(params, dt) if any(effect in names for effect, _ in LATE) else None
+    linked = any(effect in names for effect in LINK_EFFECTS)
+    return Candidates(track, wide, nuisance, linked, gap, compliance, gain, age, dt)
 
 
 def _link_of(params, rotor):

@@ -7,7 +7,7 @@ drives the joint, in windows too short for errors to add up (multiple shooting).
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 
 import jax
@@ -19,7 +19,7 @@ from envs.actuator.chain import JointInput, chain_step, init_states
 from envs.actuator.effect import Substep
 from envs.actuator.joint import joint_step
 from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
-from sysid.diagnosis.fits.memory import Memory, remembered
+from sysid.diagnosis.fits.memory import remembered
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.replay import band, cascade
@@ -30,6 +30,7 @@ from sysid.diagnosis.replay.motion import Motion, Track, with_candidates
 from sysid.diagnosis.replay.surroundings import surroundings_at
 from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.simulated import play
+from sysid.diagnosis.simulated.known import Known
 from sysid.diagnosis.simulated.part_targets import part_targets
 from sysid.diagnosis.simulated.windows import cut_windows
 
@@ -51,19 +52,6 @@ WINDOW_S = 0.5
 BEGIN_ROUNDS = 2
 """Fixed-point steps to where an encoder reads an angle; each leaves the square of the
 share by which the encoder's slope is not one."""
-
-
-@dataclass(frozen=True, eq=False)
-class Known:
-    """What has been simulated of one track.
-
-    Attributes:
-        angles: of candidates, by program and whether their readings are late.
-        targets: mean targets, by the parameters of their path.
-    """
-
-    angles: dict[tuple[Program, bool], Memory] = field(default_factory=dict)
-    targets: Memory = field(default_factory=dict)
 
 
 def simulated(
@@ -91,28 +79,19 @@ def simulated(
         Identification Techniques for O.D.E., 1983 (multiple shooting); integration:
         `envs.actuator.joint`.
     """
-    dt = problem.data.dt
-    means = _parts(dt, _target_s(problem))
-    substeps = means * _parts(dt / means, SUBSTEP_S)
-    driven = problem.known == "mechanics"
     track, known = problem.data.track, Known() if known is None else known
-    window = max(round(WINDOW_S / dt), 8) if driven else len(track.cmd)
-    fixed = (dt / substeps, substeps, window, driven)
-
-    walk = dt / substeps * (substeps // means), means, known.targets
+    means, (step, substeps, *_) = _steps(problem)
+    walk = step * (substeps // means), means, known.targets
     params = problem.space.values(thetas)[0]
-    targets = part_targets(track, params, *walk)
+    targets, which = part_targets(track, params, *walk)
     # What others do is carried once for all where it was measured in time. Beside a
     # late candidate, one in time would read another first step: they are apart.
     late = are_late(params, len(thetas))
 
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
-        params, nuisance = problem.space.values(thetas[lanes])
-        acting = {name: params[name] for name in program}
-        age = ages(params, dt) if late[lanes[0]] else None
-        moved = (targets[lanes], age)
-        out = _simulated(track, moved, acting, nuisance, program, *fixed)
-        return lanes_first(out, count)[:, rows]
+        some = thetas[lanes], targets[which[lanes]], bool(late[lanes[0]])
+        out = _simulated(*_arguments(problem, program, *some))
+        return lanes_first(np.asarray(out)[rows], count)
 
     def angles(program: Program, who: np.ndarray, new: np.ndarray) -> np.ndarray:
         batches = [partial(batch, program, *lanes) for lanes in in_lanes(who[new])]
@@ -121,14 +100,56 @@ def simulated(
     calls, order = [], []
     for behind in (False, True):
         some = np.flatnonzero(late == behind)
-        for program, which in programs(problem.space, thetas[some]):
-            who = some[which]
+        for program, acting in programs(problem.space, thetas[some]):
+            who = some[acting]
             before = known.angles.setdefault((program, behind), {})
             evaluate = partial(angles, program, who)
             calls.append(partial(remembered, before, thetas[who], evaluate))
             order.append(who)
     found = np.concatenate(side_by_side(calls)).astype(float)
     return found[np.argsort(np.concatenate(order))]
+
+
+def compile_simulation(
+    problem: Problem, program: Program, late: bool, lanes: int
+) -> None:
+    """Compiles a program, so that `simulated` finds it when it first needs it.
+
+    Args:
+        problem: a joint's track and coordinates.
+        program: its effects.
+        late: whether it is that of readings that are late.
+        lanes: number of candidates that it simulates.
+    """
+    thetas = np.repeat(problem.space.nominal[None], lanes, 0)
+    steps, pieces = problem.data.track.cmd.shape
+    targets = np.zeros((lanes, steps, _steps(problem)[0], pieces), np.float32)
+    _simulated.lower(*_arguments(problem, program, thetas, targets, late)).compile()
+
+
+def _arguments(
+    problem: Problem,
+    program: Program,
+    thetas: Float[np.ndarray, "c n"],
+    targets: Float[np.ndarray, "c t k p"],
+    late: bool,
+) -> tuple:
+    """Returns what `_simulated` takes for candidates."""
+    params, nuisance = problem.space.values(thetas)
+    acting = {name: params[name] for name in program}
+    age = ages(params, problem.data.dt) if late else None
+    track, (_, fixed) = problem.data.track, _steps(problem)
+    return (track, (targets, age), acting, nuisance, program, *fixed)
+
+
+def _steps(problem: Problem) -> tuple[int, tuple[float, int, int, bool]]:
+    """Returns how many targets a step has, and how `_simulated` divides time."""
+    dt, driven = problem.data.dt, problem.known == "mechanics"
+    means = _parts(dt, _target_s(problem))
+    substeps = means * _parts(dt / means, SUBSTEP_S)
+    steps = len(problem.data.track.cmd)
+    window = max(round(WINDOW_S / dt), 8) if driven else steps
+    return means, (dt / substeps, substeps, window, driven)
 
 
 def _target_s(problem: Problem) -> float:

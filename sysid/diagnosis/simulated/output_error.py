@@ -23,7 +23,8 @@ from sysid.diagnosis.likelihood.whitening import (
 )
 from sysid.diagnosis.replay.band import FINE_TAPS, sample_rows
 from sysid.diagnosis.replay.timing_uncertainty import CYCLE_S, sampling_uncertainty
-from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, Known, simulated
+from sysid.diagnosis.simulated.closed_loop import SUBSTEP_S, simulated
+from sysid.diagnosis.simulated.known import Known
 
 FAR = 1e3
 """Largest error that counts, in units of the angle's size: of unstable candidates."""
@@ -36,7 +37,7 @@ class OutputProblem(Problem):
     Attributes:
         equations: the residuals from which its candidates come.
         stages: candidates that came from them, by the effects of the smaller model.
-        seen: what was simulated; see `closed_loop`.
+        seen: what was simulated.
         push_shares: how much is lost of what may be of pushes as they are sampled, and
             as they are read [1].
     """

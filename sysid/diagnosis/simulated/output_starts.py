@@ -8,6 +8,10 @@ fitted alone at first. What has left its tolerance in the smaller model may stan
 the effect: beside it the effect does nothing, or does it twice.
 """
 
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+
 import numpy as np
 from jaxtyping import Float
 
@@ -22,6 +26,7 @@ from sysid.diagnosis.fits.starts import (
     many_optima,
     tried,
 )
+from sysid.diagnosis.side_by_side import side_by_side
 from sysid.diagnosis.simulated.output_error import OutputProblem
 from sysid.diagnosis.simulated.play import NAME as PLAY
 from sysid.diagnosis.simulated.torque_scales import at_every_scale
@@ -67,9 +72,30 @@ def output_starts(
         smaller: the model that lacks an effect, fitted to the angle.
         proposed: models of the equations, each with one effect more, best first.
     """
+    own = _own_starts(problem, smaller, proposed, smaller.fit.theta)
+    ways = (
+        partial(_near_and_nominal, own=own),
+        _followed,
+        _of_every_size,
+        partial(at_every_scale, most=ALONE_TRIED),
+        _with_others_back,
+    )
+    apart = [replace(problem, seen=problem.seen.apart()) for _ in ways]
+    each = zip(ways, apart, strict=True)
+    found = side_by_side([partial(way, p, smaller, proposed) for way, p in each])
+    problem.seen.join([p.seen for p in apart])
+    return list(chain.from_iterable(found))
+
+
+def _near_and_nominal(
+    problem: OutputProblem,
+    smaller: Model,
+    proposed: list[Model],
+    own: dict[str, list],
+) -> list[tuple[tuple[str, ...], Float[np.ndarray, " n"]]]:
+    """Returns the two places of those that come nearest there, fitted alone."""
     sets = [m.effects for m in proposed]
     begin = [at_nominal(problem, m) for m in proposed]
-    own = _own_starts(problem, smaller, proposed, smaller.fit.theta)
     beside = _beside(problem, proposed, smaller.fit.theta, own)
     fits = fitted_alone(problem, [*sets, *sets], [*begin, *beside])
     alone, added = fits[: len(sets)], fits[len(sets) :]
@@ -80,11 +106,7 @@ def output_starts(
     for thetas in (alone, added):
         ranked = np.argsort(costs(problem, sets, thetas))
         chosen |= dict.fromkeys(ranked[:ALONE_TRIED].tolist())
-    starts = [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
-    starts += _followed(problem, smaller, proposed)
-    starts += _of_every_size(problem, smaller, proposed)
-    starts += at_every_scale(problem, smaller, proposed, ALONE_TRIED)
-    return starts + _with_others_back(problem, smaller, proposed)
+    return [(sets[k], start) for k in chosen for start in (near[k], alone[k])]
 
 
 def _of_every_size(

@@ -11,7 +11,7 @@ from functools import partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jaxtyping import Array, Float
+from jaxtyping import Array, Float, Int
 
 from sysid.diagnosis.fits.lanes import in_lanes, lanes_first
 from sysid.diagnosis.fits.memory import Memory, remembered
@@ -29,7 +29,7 @@ MOVING = ("lowpass_cutoff", "slew_limit", "directional_slew", "acceleration_limi
 
 def part_targets(
     track: Track, params: Values, dt: float, parts: int, known: Memory
-) -> Float[np.ndarray, "c t k p"]:
+) -> tuple[Float[np.ndarray, "u t k p"], Int[np.ndarray, " c"]]:
     """Mean commands of candidates over a step's equal parts k; see `command_path`.
 
     Args:
@@ -40,12 +40,15 @@ def part_targets(
         known: paths so far of the same track and parts; it grows.
 
     Returns:
-        Means [rad], in single precision.
+        Means [rad], in single precision, once for those that have the same path, and
+        which of them is a candidate's.
 
     Source:
         Ours.
     """
     names, rows = path_rows(params)
+    first, which = _first_of_each(rows)
+    rows = rows[first]
 
     def batch(slots: int, lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
         some = path_values(names, lanes)
@@ -63,7 +66,16 @@ def part_targets(
         order = np.concatenate([who for _, who in kinds])
         return np.concatenate(side_by_side(calls))[np.argsort(order)]
 
-    return remembered(known, rows, walked)
+    return remembered(known, rows, walked), which
+
+
+def _first_of_each(
+    rows: Float[np.ndarray, "c n"],
+) -> tuple[Int[np.ndarray, " u"], Int[np.ndarray, " c"]]:
+    """Returns where each row is for the first time, in their order, and whose it is."""
+    _, first, which = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    return first[order], np.argsort(order)[which.reshape(-1)]
 
 
 def _moves(names: Names, rows: np.ndarray) -> np.ndarray:

@@ -11,7 +11,8 @@ from sysid.diagnosis.fits.candidate import fit_models
 from sysid.diagnosis.fits.projected import linear_costs
 from sysid.diagnosis.search.settling import settled
 from sysid.diagnosis.simulated import output_starts as module
-from sysid.diagnosis.simulated.closed_loop import Known, simulated
+from sysid.diagnosis.simulated.closed_loop import simulated
+from sysid.diagnosis.simulated.known import Known
 from sysid.diagnosis.simulated.output_error import output_problem
 from sysid.diagnosis.simulated.output_starts import (
     ALONE_TRIED,
