@@ -73,7 +73,7 @@ def command_paths(
         some = path_values(names, lanes[:, :-1])
         if k < 2:
             some.pop(SLOWEST[0], None)
-        return lanes_first(_walked(track.held, track.sent, some, dt, k > 0), count)
+        return np.asarray(_walked(track.held, track.sent, some, dt, k > 0))[:count]
 
     def walked(new: np.ndarray) -> np.ndarray:
         kinds = [(k, np.flatnonzero(kind[new] == k)) for k in range(3)]
@@ -102,5 +102,5 @@ def _walked(
     params: Params,
     dt: float,
     between: bool,
-) -> Float[Array, "k t p c"]:
-    return paths_of(command_path(held, sent, params, dt, between))
+) -> Float[Array, "c k t p"]:
+    return lanes_first(paths_of(command_path(held, sent, params, dt, between)))

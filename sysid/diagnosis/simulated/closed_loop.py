@@ -91,7 +91,7 @@ def simulated(
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
         some = thetas[lanes], targets[which[lanes]], bool(late[lanes[0]])
         out = _simulated(*_arguments(problem, program, *some))
-        return lanes_first(np.asarray(out)[rows], count)
+        return np.asarray(out)[:count, rows]
 
     def angles(program: Program, who: np.ndarray, new: np.ndarray) -> np.ndarray:
         batches = [partial(batch, program, *lanes) for lanes in in_lanes(who[new])]
@@ -175,7 +175,7 @@ def _simulated(
     substeps: int,
     window: int,
     driven: bool,
-) -> Float[Array, "t p c"]:
+) -> Float[Array, "c t p"]:
     """Integrates all candidates side by side, on targets and ages of readings."""
     targets, age = moved
     effects = {n: {k: v[None, :] for k, v in params[n].items()} for n in program}
@@ -236,7 +236,7 @@ def _simulated(
     moving = placed(first, cut.target[0, 0], rest(q0, dt), always, q0, q0)
     start = (rest(moving[0], dt), *moving, q0)
     rows = (cut.before, cut.motion, cut.target, cut.resumed, cut.number)
-    return _joined(jax.lax.scan(step, start, rows)[1], track)
+    return lanes_first(_joined(jax.lax.scan(step, start, rows)[1], track))
 
 
 def _between(before, after, share):

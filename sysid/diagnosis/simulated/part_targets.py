@@ -52,7 +52,7 @@ def part_targets(
 
     def batch(slots: int, lanes: np.ndarray, count: int, moves: bool) -> np.ndarray:
         some = path_values(names, lanes)
-        return lanes_first(_walked(track, some, dt, parts, slots, moves), count)
+        return np.asarray(_walked(track, some, dt, parts, slots, moves))[:count]
 
     def walked(new: np.ndarray) -> np.ndarray:
         moves = _moves(names, rows[new])
@@ -98,7 +98,7 @@ def _targets_of_a_part(track: Track, parts: int) -> int:
 @partial(jax.jit, static_argnames=("dt", "parts", "slots", "moves"))
 def _walked(
     track: Track, params: Params, dt: float, parts: int, slots: int, moves: bool
-) -> Float[Array, "t k p c"]:
+) -> Float[Array, "c t k p"]:
     """Mean commands along the last targets of every part."""
     ages = _ages(track.sent, parts, jnp)
     last = jnp.sum(ages <= 0.0, 2, keepdims=True) - 1
@@ -112,7 +112,7 @@ def _walked(
         mean = command_path(held, sent, params, dt, False).mean
     else:
         mean = held_command(held, sent, params, dt)
-    return mean.reshape(-1, parts, *mean.shape[1:])
+    return lanes_first(mean.reshape(-1, parts, *mean.shape[1:]))
 
 
 def _ages(sent, parts: int, xp):
