@@ -4,7 +4,7 @@ A fit is one step after the other, many of which fill one core, and a program ta
 long to compile as to run thirty times. Nothing depends on when that is done.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 
@@ -47,11 +47,16 @@ def compiled_ahead(problem: Problem) -> Iterator[None]:
     thread = ThreadPoolExecutor(1)
     for kind in reversed(range(len(LEFT_OUT))):
         thread.submit(compile_equations, problem.data, problem.space, kind)
-    by_angle = output_problem(problem) is not None
-    for costly, late, lanes in LIKELY[: None if by_angle else SURE]:
+    for costly, late, lanes in _likely(problem):
         program = program_of(problem.space, costly)
         thread.submit(compile_simulation, problem, program, late, lanes)
     try:
         yield
     finally:
         thread.shutdown(cancel_futures=True)
+
+
+def _likely(problem: Problem) -> Sequence[tuple[tuple[str, ...], bool, int]]:
+    if problem.known == "controller":
+        return ()
+    return LIKELY if output_problem(problem) else LIKELY[:SURE]

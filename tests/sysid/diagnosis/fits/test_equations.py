@@ -21,6 +21,6 @@ def test_company_changes_no_error():
 
     together = errors(rows)
     alone = np.concatenate([errors(row[None]) for row in rows])
-    size = np.abs(together).max()
+    size = float(np.abs(together).max())
     assert together == pytest.approx(alone, abs=1e-6 * size)
     assert np.abs(together[1:] - together[0]).max((1, 2, 3)).min() > 1e-4 * size
