@@ -5,6 +5,8 @@ apart, so the error of a fit has an optimum for every grid, each as narrow as th
 are tried, down to the finest that could gain anything.
 """
 
+from functools import partial
+
 import numpy as np
 from jaxtyping import Float
 from scipy.signal import lfilter
@@ -13,6 +15,7 @@ from sysid.diagnosis.fits.lanes import LANES
 from sysid.diagnosis.fits.parameters import Slot
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.replay.band import EVERY, TAPS
+from sysid.diagnosis.side_by_side import side_by_side
 
 MOST_GRIDS = 6e7
 """Largest number of grids that are tried, times that of the targets."""
@@ -56,9 +59,9 @@ def grid_optima(
     raw = problem.raw(origin[None])
     residual = problem.whitened(raw)[0]
     gain = np.asarray(track.kp) * (2.0 * seen - 1.0) * problem.weight[seen]
-    likeness = []
-    for first in range(0, len(grids), LANES):
-        grid = grids[first : first + LANES, None, None]
+
+    def likeness(grids: Float[np.ndarray, " k"]) -> Float[np.ndarray, " k"]:
+        grid = grids[:, None, None]
         rounding = grid * np.round(targets / grid) - targets
         smooth = np.asarray(lfilter([1.0 - keeps], [1.0, -keeps], rounding, axis=1))
         moved = np.zeros((len(grid), *raw.shape[1:]))
@@ -66,8 +69,11 @@ def grid_optima(
         moved[:, seen] = gain * _banded(smooth, delay + 0.5, raw.shape[2])
         shown = problem.whitened(np.where(problem.valid, moved, 0.0))
         size = np.sqrt(np.sum(shown**2, 1))
-        likeness.append(-shown @ residual / np.maximum(size, 1e-12))
-    best = np.argsort(-np.concatenate(likeness))[:OPTIMA]
+        return -shown @ residual / np.maximum(size, 1e-12)
+
+    batches = np.split(grids, range(LANES, len(grids), LANES))
+    found = side_by_side([partial(likeness, batch) for batch in batches])
+    best = np.argsort(-np.concatenate(found))[:OPTIMA]
     return grids[best] / slot.scale
 
 
