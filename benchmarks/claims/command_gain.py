@@ -40,11 +40,12 @@ TURNS = ((0.1, 0.0, 0.45), (0.1, 0.0, -0.45), (0.0, 0.0, 0.45), (0.0, 0.0, -0.45
 STRAIGHT = (FORWARD, (0.0, 0.12, 0.0), (0.0, -0.12, 0.0))
 RIGHT = STRAIGHT[-1]
 
+PARTICIPATION = ("five_finger_participation", "non_nail_participation")
+
 AT_LEAST = {
     "task_speed_low_mps": 0.095,
     "survival": 0.98,
-    "five_finger_participation": 0.97,
-    "non_nail_participation": 0.97,
+    **dict.fromkeys(PARTICIPATION, 0.97),
     "forward_path_speed_mps": 0.12,
     "right_path_speed_mps": 0.05,
     "settled": 0.9,
@@ -70,7 +71,7 @@ def measured(source: PolicySource, episodes: int) -> dict[str, float]:
     rows = {tuple(row["command"]): row for row in obeyed(source, course)}
     turned = {command: row["turn_rate_rad_s"]["mean"] for command, row in rows.items()}
     headings = held(source, course, HeadingConfig(4.0, 0.0, *rates))
-    names = ("turn_rate_error_rad_s", "survival", *list(AT_LEAST)[2:4])
+    names = ("turn_rate_error_rad_s", "survival", *PARTICIPATION)
     return {
         "task_speed_mps": drawn["task_speed_mps"]["mean"],
         "task_speed_low_mps": drawn["task_speed_mps"]["low"],

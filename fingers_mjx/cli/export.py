@@ -39,8 +39,9 @@ def _check(args: argparse.Namespace) -> None:
 
     (check_kind if args.command_gain else check_run)(args.run_dir)
     args.out = args.out or args.run_dir
-    if args.command_gain and args.out.resolve() == args.run_dir.resolve():
-        valid = "another directory: a gain would be applied to a gain"
+    source = args.run_dir if args.run_dir.is_dir() else args.run_dir.parent
+    if args.command_gain and args.out.resolve() == source.resolve():
+        valid = "another directory: the policy would be lost"
         raise InputError("--out", "", args.out, valid)
     options.check_directory("--out", args.out)
 

@@ -123,9 +123,9 @@ def _arguments(
 
 
 def _kinds(params: Values, count: int) -> Int[np.ndarray, " c"]:
-    """Returns which program evaluates a candidate: any does that of a larger number.
+    """Returns the first of `LEFT_OUT` with which a candidate may be evaluated.
 
     Batches are as many as without kinds: each is evaluated as its slowest candidate.
     """
     late, linked = are_late(params, count), are_linked(params, count)
-    return np.where(late, len(LEFT_OUT) - 1, 1 * linked)
+    return np.where(late, len(LEFT_OUT) - 1, linked.astype(int))

@@ -2,7 +2,8 @@
 
 Fits that go on from where others ended, or begin at one place with several sets of
 effects, ask for the same again: a quarter of all. A result counts for one program only,
-since two of them agree to the last digit but one, and a search may turn on that.
+since two of them agree to the last digit but one, and a search may turn on that; those
+of `equations.LEFT_OUT` share a memory, as they do the same in the same order.
 """
 
 from collections.abc import Callable

@@ -24,11 +24,10 @@ from envs.actuator.trigonometry import sine_cosine
 MOST_ROTOR = 0.9
 """Largest share of a joint's inertia that is on the motor's side."""
 
-EFFECTS = ("backlash", "compliance")
-"""Effects that act here."""
-
 SIZES = (("backlash", "gap_rad"), ("compliance", "compliance_rad_nm"))
-"""The parameter of each that is zero where motor and link move as one."""
+"""Effects that act here, with the parameter that is zero where both move as one."""
+
+EFFECTS = tuple(effect for effect, _ in SIZES)
 
 State = tuple[Float[Array, "p c"], Float[Array, "p c"]]
 """Angle [rad] and speed [rad/s] of the link less the motor's."""

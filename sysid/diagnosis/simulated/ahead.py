@@ -44,16 +44,22 @@ def compiled_ahead(problem: Problem) -> Iterator[None]:
     Args:
         problem: of a joint, which may be simulated.
     """
-    thread = ThreadPoolExecutor(1)
-    for kind in reversed(range(len(LEFT_OUT))):
-        thread.submit(compile_equations, problem.data, problem.space, kind)
-    for costly, late, lanes in _likely(problem):
-        program = program_of(problem.space, costly)
-        thread.submit(compile_simulation, problem, program, late, lanes)
-    try:
-        yield
-    finally:
-        thread.shutdown(cancel_futures=True)
+    space = problem.space
+    with ThreadPoolExecutor(1) as thread:
+        begun = [
+            thread.submit(compile_equations, problem.data, space, kind)
+            for kind in reversed(range(len(LEFT_OUT)))
+        ]
+        for costly, late, lanes in _likely(problem):
+            what = problem, program_of(space, costly), late, lanes
+            begun.append(thread.submit(compile_simulation, *what))
+        try:
+            yield
+        finally:
+            thread.shutdown(cancel_futures=True)  # one may be half done, 2 s at most
+    for one in begun:
+        if not one.cancelled():
+            one.result()  # raises what it ended in
 
 
 def _likely(problem: Problem) -> Sequence[tuple[tuple[str, ...], bool, int]]:

@@ -73,15 +73,18 @@ def output_starts(
         proposed: models of the equations, each with one effect more, best first.
     """
     own = _own_starts(problem, smaller, proposed, smaller.fit.theta)
-    apart = [replace(problem, seen=problem.seen.apart()) for _ in range(5)]
-    given = [(p, smaller, proposed) for p in apart]
+    ways = (
+        partial(_near_and_nominal, own=own),
+        _followed,
+        _of_every_size,
+        partial(at_every_scale, most=ALONE_TRIED),
+        _with_others_back,
+    )
+    apart = [replace(problem, seen=problem.seen.apart()) for _ in ways]
     found = side_by_side(
         [
-            partial(_near_and_nominal, *given[0], own),
-            partial(_followed, *given[1]),
-            partial(_of_every_size, *given[2]),
-            partial(at_every_scale, *given[3], ALONE_TRIED),
-            partial(_with_others_back, *given[4]),
+            partial(way, one, smaller, proposed)
+            for way, one in zip(ways, apart, strict=True)
         ]
     )
     problem.seen.join([p.seen for p in apart])

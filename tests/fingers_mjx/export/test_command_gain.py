@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from support.cli_setup import make_run, make_setup
 
 from fingers_deploy import load_bundle
 from fingers_mjx.cli.main import main
@@ -53,8 +54,20 @@ def test_the_onnx_file_may_be_named(exported, tmp_path):
     ).read_bytes()
 
 
-def test_a_gain_is_not_applied_to_a_gain(exported, capsys):
-    status = main(["export", str(exported), "--command-gain", *GAIN])
+def test_of_a_run_the_newest_checkpoint_is_taken(tmp_path):
+    """Not the policy that an export has left there."""
+    run = make_run(tmp_path / "run", make_setup())
+    (run / "policy.onnx").write_bytes(b"older")
+
+    export_with_gain(run, tmp_path / "out", (2.0, 2.0, 1.0))
+
+    assert load_source(tmp_path / "out").setup == load_source(run).setup
+
+
+@pytest.mark.parametrize("name", ["", "policy.onnx"])
+def test_a_policy_is_not_written_over(name, exported, capsys):
+    words = ["--command-gain", *GAIN, "--out", str(exported)]
+    status = main(["export", str(exported / name), *words])
 
     assert status == 2
-    assert "a gain would be applied to a gain" in capsys.readouterr().err
+    assert "the policy would be lost" in capsys.readouterr().err
