@@ -65,8 +65,8 @@ def measured(source: PolicySource, episodes: int) -> dict[str, float]:
         source: policy.
         episodes: of each evaluation; of each command and heading an eighth of them.
     """
-    drawn = _means(_with_setup(source, overridden(source.setup, PAPER)), episodes)
-    forward = _means(_with_setup(source, with_command(source.setup, FORWARD)), episodes)
+    drawn = _means(source, overridden(source.setup, PAPER), episodes)
+    forward = _means(source, with_command(source.setup, FORWARD), episodes)
     course, rates = Course(episodes // 8, SEED), source.setup.env.command.yaw_rate_rps
     rows = {tuple(row["command"]): row for row in obeyed(source, course)}
     turned = {command: row["turn_rate_rad_s"]["mean"] for command, row in rows.items()}
@@ -118,13 +118,13 @@ def rows_of(
     return found
 
 
-def _means(source: PolicySource, episodes: int) -> dict[str, dict[str, float]]:
+def _means(
+    source: PolicySource, setup: Any, episodes: int
+) -> dict[str, dict[str, float]]:
+    """Returns the summaries of an evaluation in another setup."""
+    source = dataclasses.replace(source, setup=setup)
     table = evaluate_source(source, episodes, SEED)
     return summary(source, table.columns, SEED)["measures"]
-
-
-def _with_setup(source: PolicySource, setup: Any) -> PolicySource:
-    return dataclasses.replace(source, setup=setup)
 
 
 def main(words: Sequence[str] | None = None) -> int:

@@ -8,16 +8,14 @@ from pathlib import Path
 import jax.numpy as jnp
 import numpy as np
 
-from envs.config.atomic_file import write_atomic
 from envs.errors import InputError
 from fingers_mjx.export.export import ExportReport, export_policy
 from fingers_mjx.export.onnx_graph import PolicyWeights
-from fingers_mjx.export.run import export_run
+from fingers_mjx.export.run import copy_setup, export_run
 from fingers_mjx.policy.actor import act
 from fingers_mjx.policy.command_gain import with_command_gain
 from fingers_mjx.policy.place import is_run
 from fingers_mjx.policy.source import load_bundle_setup
-from fingers_mjx.runs.directory import CONFIG_FILE, HAND_FILE
 
 
 def export_with_gain(path: Path, out_dir: Path, gain: Sequence[float]) -> ExportReport:
@@ -52,8 +50,6 @@ def _with_gain(path: Path, out_dir: Path, gain: Sequence[float]) -> ExportReport
         raise InputError(path, "graph", found, valid)
     manifest = bundle.manifest
     network = with_command_gain(bundle.network, manifest.interface, gain)
-    folder = path if path.is_dir() else path.parent
-    beside = {name: (folder / name).read_bytes() for name in (CONFIG_FILE, HAND_FILE)}
     report = export_policy(
         out_dir,
         PolicyWeights(network.layers, network.mean, network.std, network.action_clip),
@@ -62,6 +58,5 @@ def _with_gain(path: Path, out_dir: Path, gain: Sequence[float]) -> ExportReport
         manifest.interface,
         replace(manifest.provenance, evaluation=None),
     )
-    for name, content in beside.items():
-        write_atomic(out_dir / name, content)
+    copy_setup(path if path.is_dir() else path.parent, out_dir)
     return report

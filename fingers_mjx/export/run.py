@@ -79,11 +79,16 @@ def export_run(run_dir: Path, out_dir: Path) -> ExportReport:
         interface_of(env),
         _provenance(run_dir, saved),
     )
+    copy_setup(run_dir, out_dir)
+    return report
+
+
+def copy_setup(source: Path, out_dir: Path) -> None:
+    """Puts the settings and the hand of a run or bundle beside another policy."""
     for name in (CONFIG_FILE, HAND_FILE):
-        content = (run_dir / name).read_bytes()
+        content = (source / name).read_bytes()
         if not (out_dir / name).exists() or (out_dir / name).read_bytes() != content:
             write_atomic(out_dir / name, content)
-    return report
 
 
 def _network(setup: Setup, saved: Saved, env: BatchEnv) -> tuple[PolicyWeights, Apply]:

@@ -3,12 +3,10 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from envs.errors import InputError
 from fingers_deploy.manifest import Interface
 from fingers_deploy.network import NumpyPolicy
-from fingers_mjx.policy.interface import places
+from fingers_mjx.policy.interface import entry_factors
 
 
 def with_command_gain(
@@ -30,12 +28,10 @@ def with_command_gain(
     Source:
         Ours.
     """
-    found = {term.name: (term, at) for term, at in places(interface)}
-    if "command" not in found or found["command"][0].size != len(gain):
-        sizes = ", ".join(f"{name} ({term.size})" for name, (term, _) in found.items())
+    sizes = {term.name: term.size for term in interface.observation.terms}
+    if sizes.get("command") != len(gain):
+        found = ", ".join(f"{name} ({size})" for name, size in sizes.items())
         valid = f"a policy that sees a command of {len(gain)} entries"
-        raise InputError("observation", "terms", sizes, valid)
-    term, at = found["command"]
-    scale = np.ones_like(network.mean)
-    scale[at : at + term.size * term.history] = np.tile(gain, term.history)
+        raise InputError("observation", "terms", found, valid)
+    scale = entry_factors(interface, "command", gain).astype(network.mean.dtype)
     return replace(network, mean=network.mean / scale, std=network.std / scale)

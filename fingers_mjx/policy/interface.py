@@ -3,9 +3,12 @@
 import dataclasses
 import hashlib
 from collections.abc import Iterator, Mapping
-from itertools import accumulate
 from pathlib import Path
 from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
 
 from envs.batch import BatchEnv
 from envs.errors import InputError
@@ -48,11 +51,21 @@ def interface_of(env: BatchEnv) -> Interface:
     )
 
 
-def places(interface: Interface) -> list[tuple[Term, int]]:
-    """Returns the terms of an observation, each with the index of its first entry."""
-    sizes = [term.size * term.history for term in interface.observation.terms]
-    starts = accumulate(sizes[:-1], initial=0)
-    return list(zip(interface.observation.terms, starts, strict=True))
+def entry_factors(
+    interface: Interface, name: str, factor: ArrayLike
+) -> Float[np.ndarray, " n"]:
+    """Returns 1 for every entry of an observation, and `factor` for those of a term.
+
+    Args:
+        interface: of the policy.
+        name: of the term, which may be missing.
+        factor: of all its entries, or one of each.
+    """
+    factors = [
+        np.broadcast_to(factor if term.name == name else 1.0, (term.history, term.size))
+        for term in interface.observation.terms
+    ]
+    return np.concatenate([one.ravel() for one in factors])
 
 
 def identity(env: BatchEnv) -> dict[str, Any]:

@@ -11,9 +11,9 @@ from jaxtyping import Float
 
 from envs.errors import InputError
 from fingers_deploy import Bundle, load_bundle
-from fingers_deploy.manifest import Interface
+from fingers_deploy.manifest import Interface, Term
 from fingers_mjx.policy.actor import read, warm_started
-from fingers_mjx.policy.interface import interface_of, places
+from fingers_mjx.policy.interface import entry_factors, interface_of
 from fingers_mjx.policy.place import is_bundle
 from fingers_mjx.ppo.brax import PPONetworkParams
 from fingers_mjx.ppo.state import TrainState
@@ -85,12 +85,21 @@ def _with_policy(train: TrainState, policy: Any) -> TrainState:
 
 def _rows(theirs: Interface, ours: Interface) -> np.ndarray:
     """Returns where each of our observation's entries is in theirs, -1 if nowhere."""
-    found = {term: at for term, at in places(theirs)}
+    found = {term: at for term, at in _places(theirs)}
     parts = []
-    for term, _ in places(ours):
+    for term, _ in _places(ours):
         size, at = term.size * term.history, found.get(term, -1)
         parts.append(np.arange(at, at + size) if at >= 0 else np.full(size, -1))
     return np.concatenate(parts)
+
+
+def _places(interface: Interface) -> list[tuple[Term, int]]:
+    terms = interface.observation.terms
+    ends = np.cumsum([term.size * term.history for term in terms])
+    return [
+        (term, int(end) - term.size * term.history)
+        for term, end in zip(terms, ends, strict=True)
+    ]
 
 
 def _layers(bundle: Bundle, rows: np.ndarray, gain: float) -> list[Any]:
@@ -105,10 +114,8 @@ def _layers(bundle: Bundle, rows: np.ndarray, gain: float) -> list[Any]:
 
 def _statistics(bundle: Bundle, ours: Interface, gain: float) -> list[Any]:
     """Returns mean and deviation of their inputs, each with that of a new input."""
-    network, scale = bundle.network, np.ones(len(bundle.network.mean))
-    for term, at in places(bundle.manifest.interface):
-        if term.name == "previous_action":
-            scale[at : at + term.size * term.history] = gain
+    network = bundle.network
+    scale = entry_factors(bundle.manifest.interface, "previous_action", gain)
     return [(network.mean * scale, 0.0), (network.std * scale, NEW_STD)]
 
 

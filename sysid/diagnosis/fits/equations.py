@@ -14,9 +14,9 @@ from sysid.diagnosis.fits.lanes import FEW_LANES, in_lanes
 from sysid.diagnosis.fits.memory import Memory, remembered
 from sysid.diagnosis.fits.parameters import Space
 from sysid.diagnosis.fits.paths import Values, command_paths
-from sysid.diagnosis.replay.beside import LATE, are_late
-from sysid.diagnosis.replay.link import EFFECTS as LINK_EFFECTS
-from sysid.diagnosis.replay.link import are_linked
+from sysid.diagnosis.replay import link
+from sysid.diagnosis.replay.acting import are_acting
+from sysid.diagnosis.replay.beside import LATE
 from sysid.diagnosis.replay.motion import JointTrack
 from sysid.diagnosis.replay.residuals import equation_error
 from sysid.diagnosis.replay.target_path import WITHIN
@@ -24,7 +24,7 @@ from sysid.diagnosis.side_by_side import side_by_side
 
 _LATE = tuple(effect for effect, _ in LATE)
 
-LEFT_OUT = ((*_LATE, *LINK_EFFECTS), _LATE, ())
+LEFT_OUT = ((*_LATE, *link.EFFECTS), _LATE, ())
 """Effects without which an evaluation takes 0.5, 0.7 and 1 of the time."""
 
 
@@ -127,5 +127,5 @@ def _kinds(params: Values, count: int) -> Int[np.ndarray, " c"]:
 
     Batches are as many as without kinds: each is evaluated as its slowest candidate.
     """
-    late, linked = are_late(params, count), are_linked(params, count)
+    late, linked = (are_acting(params, x, count) for x in (LATE, link.SIZES))
     return np.where(late, len(LEFT_OUT) - 1, linked.astype(int))

@@ -11,14 +11,13 @@ and the posture in which that was measured is the joint's own of then, too: mass
 on from there.
 """
 
-from collections.abc import Mapping
 from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
+from sysid.diagnosis.replay.acting import Params
 from sysid.diagnosis.replay.motion import Motion
 
 BESIDE = (
@@ -28,22 +27,8 @@ BESIDE = (
 )
 """Fields of the motion that are not read by the joint's own sensor."""
 
-Params = Mapping[str, Mapping[str, Float[Array | np.ndarray, " c"]]]
-"""Values of parameters of candidates c, by effect and name."""
-
 LATE = (("sensor_latency", "latency_s"), ("clock_drift", "drift_ppm"))
 """Age of the readings and drift of their clock, by effect."""
-
-
-def are_late(params: Params, count: int) -> Bool[np.ndarray, " c"]:
-    """Returns whether the readings of candidates have an age at any time.
-
-    Args:
-        params: values of the parameters by effect; effects may be missing.
-        count: number of candidates.
-    """
-    own = [np.asarray(params[e][name]) for e, name in LATE if e in params]
-    return np.any([np.zeros(count), *own], axis=0)
 
 
 def ages(params: Params, dt: float) -> Float[Array, "2 c"]:

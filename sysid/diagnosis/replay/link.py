@@ -11,12 +11,9 @@ F = load − J q̈_m,
 the motor feels the pull F − J ẍ.
 """
 
-from collections.abc import Mapping
-
 import flax.struct
 import jax.numpy as jnp
-import numpy as np
-from jaxtyping import Array, Bool, Float
+from jaxtyping import Array, Float
 
 from envs.actuator.effects.compliance import DAMPING
 from envs.actuator.trigonometry import sine_cosine
@@ -74,19 +71,6 @@ class Pull:
 
     smoothed: Float[Array, "p c"]
     sharp: Float[Array, "p c"]
-
-
-def are_linked(
-    params: Mapping[str, Mapping[str, Float[Array | np.ndarray, " c"]]], count: int
-) -> Bool[np.ndarray, " c"]:
-    """Returns whether the links of candidates may move against their motors.
-
-    Args:
-        params: values of the parameters by effect; effects may be missing.
-        count: number of candidates.
-    """
-    own = [np.asarray(params[e][name]) for e, name in SIZES if e in params]
-    return np.any([np.zeros(count), *own], axis=0)
 
 
 def link_step(

@@ -23,7 +23,8 @@ from sysid.diagnosis.fits.memory import remembered
 from sysid.diagnosis.fits.problem import Problem
 from sysid.diagnosis.fits.programs import Program, programs
 from sysid.diagnosis.replay import band, cascade
-from sysid.diagnosis.replay.beside import ages, are_late, beside
+from sysid.diagnosis.replay.acting import are_acting
+from sysid.diagnosis.replay.beside import LATE, ages, beside
 from sysid.diagnosis.replay.effects import ENTER
 from sysid.diagnosis.replay.model import Nuisance
 from sysid.diagnosis.replay.motion import Motion, Track, with_candidates
@@ -86,7 +87,7 @@ def simulated(
     targets, which = part_targets(track, params, *walk)
     # What others do is carried once for all where it was measured in time. Beside a
     # late candidate, one in time would read another first step: they are apart.
-    late = are_late(params, len(thetas))
+    late = are_acting(params, LATE, len(thetas))
 
     def batch(program: Program, lanes: np.ndarray, count: int) -> np.ndarray:
         some = thetas[lanes], targets[which[lanes]], bool(late[lanes[0]])

@@ -77,7 +77,7 @@ def output_starts(
         partial(_near_and_nominal, own=own),
         _followed,
         _of_every_size,
-        partial(at_every_scale, most=ALONE_TRIED),
+        lambda one, base, more: at_every_scale(one, base, more, ALONE_TRIED),
         _with_others_back,
     )
     apart = [replace(problem, seen=problem.seen.apart()) for _ in ways]
