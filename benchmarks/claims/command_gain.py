@@ -3,16 +3,22 @@
 python -m benchmarks.claims.command_gain POLICY --json command_gain.json
 
 A policy that goes at 0.8 of the speed it is asked for is shown more than is asked
-(`fingers export --command-gain`). The rule, written before any gain was measured on the
-seed by which it chooses: of 1.0, 1.1, … 1.5 for v_x and v_y alike, the smallest with
-which every bar of steering_planted.yaml holds on seed 1, the task speed with the lower
-end of its 95 % interval. Seed 0, which all other results here have, is not looked at.
-On seed 0 the gains 1.1 and 1.25 had been tried before, with task speeds of 0.096 and
-0.101 m/s.
+(`fingers export --command-gain`). The rule, written before any pair of gains was
+measured on the seed by which it chooses: of 1.0, 1.1, 1.2 and 1.3 for v_x with 1.0,
+1.2, 1.4 and 1.6 for v_y, those with which every bar of steering_planted.yaml holds on
+seed 1, the task speed with the lower end of its 95 % interval; of these the pair with
+the least error of the planar velocity over the commands of the paper, which punishes
+more than is asked as well as less. Seed 0, which all other results here have, is not
+looked at.
+
+What was known before: a first rule took the smallest of 1.0, 1.1, … 1.5 for both
+alike, 1.2; and the pairs (1, 1), (1.2, 1.2), (1, 1.3), (1.1, 1.1), (1.1, 1.6) and
+(1, 2) had been tried on 256 other commands.
 """
 
 import argparse
 import dataclasses
+import itertools
 import json
 import sys
 from collections.abc import Mapping, Sequence
@@ -31,7 +37,8 @@ from fingers_mjx.policy.source import PolicySource, load_bundle_setup
 from fingers_mjx.runs.settings import overridden
 from fingers_robot.behaviour.heading import HeadingConfig
 
-GAINS = (1.0, 1.1, 1.2, 1.3, 1.4, 1.5)
+GAINS = tuple(itertools.product((1.0, 1.1, 1.2, 1.3), (1.0, 1.2, 1.4, 1.6)))
+"""Of v_x and v_y."""
 SEED = 1
 PAPER = ["env.command.turning_fraction=0", "env.command.straight_fraction=0"]
 """Settings with which commands are drawn as in the paper."""
@@ -40,6 +47,7 @@ TURNS = ((0.1, 0.0, 0.45), (0.1, 0.0, -0.45), (0.0, 0.0, 0.45), (0.0, 0.0, -0.45
 STRAIGHT = (FORWARD, (0.0, 0.12, 0.0), (0.0, -0.12, 0.0))
 RIGHT = STRAIGHT[-1]
 
+ERROR = "planar_velocity_error_mps"
 PARTICIPATION = ("five_finger_participation", "non_nail_participation")
 
 AT_LEAST = {
@@ -71,7 +79,7 @@ def measured(source: PolicySource, episodes: int) -> dict[str, float]:
     rows = {tuple(row["command"]): row for row in obeyed(source, course)}
     turned = {command: row["turn_rate_rad_s"]["mean"] for command, row in rows.items()}
     headings = held(source, course, HeadingConfig(4.0, 0.0, *rates))
-    names = ("turn_rate_error_rad_s", "survival", *PARTICIPATION)
+    names = (ERROR, "turn_rate_error_rad_s", "survival", *PARTICIPATION)
     return {
         "task_speed_mps": drawn["task_speed_mps"]["mean"],
         "task_speed_low_mps": drawn["task_speed_mps"]["low"],
@@ -91,15 +99,17 @@ def missed(row: Mapping[str, float]) -> list[str]:
     return low + [name for name, bar in AT_MOST.items() if not row[name] <= bar]
 
 
-def chosen(rows: Sequence[Mapping[str, Any]]) -> float | None:
-    """Returns the smallest gain that misses no bar, None if each misses one."""
-    return min((row["gain"] for row in rows if not missed(row)), default=None)
+def chosen(rows: Sequence[Mapping[str, Any]]) -> tuple[float, float] | None:
+    """Returns the gains that miss no bar with the least error, None if each misses."""
+    good = [row for row in rows if not missed(row)]
+    best = min(good, key=lambda row: row[ERROR], default=None)
+    return best and (best["gain_vx"], best["gain_vy"])
 
 
 def rows_of(
-    path: Path, gains: Sequence[float], episodes: int
+    path: Path, gains: Sequence[tuple[float, float]], episodes: int
 ) -> list[dict[str, float]]:
-    """Measures a policy under each of the gains, printing as it goes.
+    """Measures a policy under each pair of gains, printing as it goes.
 
     Raises:
         InputError: no bundle, or of a policy without commands.
@@ -108,11 +118,11 @@ def rows_of(
     steps = bundle.manifest.provenance.normalizer.steps
     interface = bundle.manifest.interface
     found = []
-    for gain in gains:
-        factors = (gain, gain, 1.0)
+    for along, across in gains:
+        factors = (along, across, 1.0)
         network = with_command_gain(bundle.network, interface, factors)
         row = measured(PolicySource(path, setup, network, steps), episodes)
-        found.append({"gain": gain, **row})
+        found.append({"gain_vx": along, "gain_vy": across, **row})
         shown = ", ".join(f"{name} {value:.4g}" for name, value in found[-1].items())
         print(f"{shown}; misses: {', '.join(missed(row)) or 'none'}", flush=True)
     return found
@@ -131,12 +141,11 @@ def main(words: Sequence[str] | None = None) -> int:
     """Measures, prints the choice, and keeps the rows."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("policy", type=Path, metavar="POLICY")
-    parser.add_argument("--gains", type=float, nargs="+", default=GAINS)
     parser.add_argument("--episodes", type=int, default=256)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args(words)
     try:
-        rows = rows_of(args.policy, args.gains, args.episodes)
+        rows = rows_of(args.policy, GAINS, args.episodes)
     except InputError as error:
         print(f"command_gain: {error}", file=sys.stderr)
         return 2

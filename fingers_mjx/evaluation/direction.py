@@ -25,6 +25,7 @@ BETTER: Mapping[str, Mapping[str, Better]] = {
         "worst_tip_planting_fraction": "higher",
         "cost_of_transport": "lower",
         "turn_rate_error_rad_s": "lower",
+        "planar_velocity_error_mps": "lower",
         **STANDING,
         # Of a hand that is commanded to walk straight on; drifts by their size.
         "drift_deg_s": "lower",

@@ -224,31 +224,6 @@ def cost_of_transport(
     )
 
 
-def turn_rate_error_rad_s(
-    yaw_rate: Float[Array, " T"],
-    command_yaw_rate: Float[Array, " T"],
-    alive: Bool[Array, " T"],
-    dt_s: float,
-    window_s: float = 1.0,
-) -> Float[Array, ""]:
-    """How far the heading rate is from its command [rad/s], at least 0.
-
-    mean_t |(1/w) Σ_{s in t..t+w} (ω_s - c_s)|: the error of sliding one-second means,
-    because the yaw rate swings within each stride. NaN for an episode shorter than the
-    window.
-
-    Source:
-        Ours.
-    """
-    span = max(1, round(window_s / dt_s))
-    error = jnp.where(alive, yaw_rate - command_yaw_rate, 0.0)
-    if span > len(error):
-        return jnp.array(jnp.nan, error.dtype)
-    kernel = jnp.full(span, 1.0 / span, error.dtype)
-    means = jnp.convolve(error, kernel, mode="valid")
-    return masked_mean(jnp.abs(means), alive[span - 1 :])
-
-
 def survival(failed: Bool[Array, " T"]) -> Float[Array, ""]:
     """1 - max_t failed_t ∈ {0, 1} [1]: whether no failure ended the episode early.
 

@@ -6,7 +6,7 @@ from jaxtyping import Array, Bool, Float
 
 from envs.base import State
 from envs.physics.room import ROOM
-from fingers_mjx.evaluation import measures
+from fingers_mjx.evaluation import measures, tracking_error
 
 MASS_KG = 0.818
 
@@ -140,8 +140,11 @@ def _motion_measures(
             energy, speed, duration, mass_kg
         ),
         "turn_rate_rad_s": measures.masked_mean(trace.yaw_rate, alive),
-        "turn_rate_error_rad_s": measures.turn_rate_error_rad_s(
+        "turn_rate_error_rad_s": tracking_error.turn_rate_error_rad_s(
             trace.yaw_rate, command[:, 2], alive, dt_s
+        ),
+        "planar_velocity_error_mps": tracking_error.planar_velocity_error_mps(
+            trace.vel_v, command, alive, dt_s
         ),
         "command_speed_mps": measures.masked_mean(planar, alive),
         "command_turn_rate_rad_s": measures.masked_mean(command[:, 2], alive),

@@ -8,6 +8,7 @@ import pytest
 from benchmarks.claims.command_gain import (
     AT_LEAST,
     AT_MOST,
+    ERROR,
     GAINS,
     chosen,
     main,
@@ -44,29 +45,35 @@ def test_what_is_undefined_misses(name):
     assert missed(GOOD | {name: float("nan")}) == [name]
 
 
-def test_the_smallest_that_misses_none_is_chosen():
-    bad = GOOD | {"survival": 0.5}
-    rows = [bad | {"gain": 1.0}, GOOD | {"gain": 1.3}, GOOD | {"gain": 1.2}]
+def row(gains, error, **changed):
+    along, across = gains
+    return GOOD | {"gain_vx": along, "gain_vy": across, ERROR: error} | changed
 
-    assert chosen(rows) == 1.2
+
+def test_the_least_error_of_those_that_miss_no_bar_is_chosen():
+    bad = row((1.0, 1.0), 0.01, survival=0.5)
+    rows = [bad, row((1.3, 1.0), 0.03), row((1.2, 1.4), 0.02)]
+
+    assert chosen(rows) == (1.2, 1.4)
     assert chosen(rows[:1]) is None
 
 
-def test_the_committed_policy_has_the_gain_that_was_chosen():
+def test_the_committed_policy_has_the_gains_that_were_chosen():
     rows = json.loads(MEASURED.read_text("utf-8"))
-    gain = (chosen(rows), chosen(rows), 1.0)
+    found = chosen(rows)
+    assert found is not None
     before, after = load_bundle(PLANTED), load_bundle(POLICY)
 
-    wanted = with_command_gain(before.network, before.manifest.interface, gain)
+    wanted = with_command_gain(before.network, before.manifest.interface, (*found, 1.0))
 
-    assert [row["gain"] for row in rows] == list(GAINS)
+    assert [(row["gain_vx"], row["gain_vy"]) for row in rows] == list(GAINS)
     assert digest(after.network) == digest(wanted) != digest(before.network)
 
 
 def test_what_the_bars_are_about_is_measured():
     found = measured(load_source(POLICY), 8)
 
-    assert set(found) == set(GOOD) | {"task_speed_mps"}
+    assert set(found) == set(GOOD) | {"task_speed_mps", ERROR}
     assert found["task_speed_low_mps"] < found["task_speed_mps"] < 0.16
 
 

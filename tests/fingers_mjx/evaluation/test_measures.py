@@ -201,18 +201,6 @@ def test_cost_of_transport_is_energy_over_weight_and_distance():
     assert np.isnan(rest)
 
 
-def test_turn_rate_error_ignores_swing_within_strides_but_not_bias():
-    time = np.arange(500) * DT
-    swing = 0.3 * np.sin(2 * np.pi * 2 * time)
-    command = np.full(500, 0.2)
-    args = jnp.array(command), alive(500), DT
-    assert ms.turn_rate_error_rad_s(jnp.array(command + swing), *args) < 1e-5
-    off = ms.turn_rate_error_rad_s(jnp.array(command + swing - 0.1), *args)
-    np.testing.assert_allclose(off, 0.1, rtol=1e-3)
-    opposite = jnp.array(np.where(time < 5, 0.1, -0.1) + command)
-    assert ms.turn_rate_error_rad_s(opposite, *args) > 0.08  # signs do not cancel
-
-
 def test_survival_and_the_end_of_an_episode():
     done = jnp.array([0, 0, 1, 0, 1]) > 0
     np.testing.assert_array_equal(ms.steps_alive(done, done), [1, 1, 0, 0, 0])
