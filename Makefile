@@ -12,6 +12,10 @@ COMPUTING := tests/envs tests/rewards tests/fingers_mjx/ppo tests/fingers_mjx/tr
 	tests/fingers_mjx/runs tests/fingers_mjx/evaluation tests/sysid/calibration
 LOGGERS := tests/fingers_mjx/runs/loggers tests/fingers_mjx/training/test_logged_runs.py
 
+# What one of the tests' processes compiled, the others read, and so does the next run.
+check test test-slow: export JAX_COMPILATION_CACHE_DIR := $(CURDIR)/.jax_cache
+check test test-slow: export JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS := 0.2
+
 .DEFAULT_GOAL := help
 .PHONY: help sync cuda12 cuda13 format check test test-loggers test-slow test-gpu test-versions demo \
 	notebooks docs battery bench compare build release clean

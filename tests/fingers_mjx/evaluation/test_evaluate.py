@@ -132,6 +132,8 @@ def test_measures_of_a_gliding_hand_are_known():
     cost = 10.0 / (9.81 * 0.08 * 2.0)
     np.testing.assert_allclose(columns["cost_of_transport"][0], cost, rtol=1e-3)
     np.testing.assert_allclose(columns["turn_rate_error_rad_s"][0], 0.1, rtol=1e-4)
+    error = columns["planar_velocity_error_mps"][0]  # 0.08 of 0.1 m/s
+    np.testing.assert_allclose(error, 0.02, rtol=1e-4)
 
 
 def test_auto_reset_changes_nothing():
