@@ -229,4 +229,4 @@ figure
 #
 # What a log needs is in `docs/guides/logs.md`, how often the answer is right, and when
 # it is not, in `docs/results/diagnosis.md`, and what policies trained on an extended
-# hand gain in `notebooks/policies/README.md`.
+# hand gain in `benchmarks/claims/README.md`.

@@ -2,7 +2,8 @@
 
 Errors of means over a sliding window of one second: velocities swing within a stride.
 As the other measures: arrays of one episode, a mask `alive`, NaN where an episode does
-not define a measure.
+not define a measure. So a hand that falls within the first second has no error: read
+them beside the survival.
 """
 
 import jax.numpy as jnp
@@ -41,7 +42,8 @@ def planar_velocity_error_mps(
     """How far the planar velocity is from its command, both in V [m/s], at least 0.
 
     mean_t ‖(1/w) Σ_{s in t..t+w} (v_s - c_s)‖: as `turn_rate_error_rad_s`; unlike the
-    task speed it punishes what goes faster than is asked, and to the side of it.
+    task speed it punishes what goes faster than is asked, and to the side of it. NaN
+    for an episode shorter than the window.
 
     Source:
         Ours.

@@ -22,9 +22,10 @@ STATED = {
     "push": POLICIES / "push" / "README.md",
     "recovery": POLICIES / "recovery" / "README.md",
 }
+WALK = ("task_speed_mps", "path_speed_mps", "turn_rate_error_rad_s")
 MEASURES = {
-    "crawl": ("task_speed_mps", "path_speed_mps", "turn_rate_error_rad_s"),
-    "crawl_steering": ("task_speed_mps", "path_speed_mps", "turn_rate_error_rad_s"),
+    "crawl": (*WALK, "planar_velocity_error_mps"),
+    "crawl_steering": (*WALK, "planar_velocity_error_mps"),
     "keyboard": ("correct_fraction", "latency_median_s"),
     "push": ("delivered", "delivered_from_30_cm"),
     "recovery": ("righted", "righted_thumb", "time_to_upright_s"),
