@@ -155,15 +155,15 @@ def _means(
     return summary(source, table.columns, SEED)["measures"]
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+def main(words: Sequence[str] | None = None) -> int:
     """Measures, prints the choice, and keeps the rows."""
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("policy", type=Path, metavar="POLICY")
-    words = "gains of their own for v_x and v_y, by the second rule"
-    parser.add_argument("--apart", action="store_true", help=words)
+    what = "gains of their own for v_x and v_y, by the second rule"
+    parser.add_argument("--apart", action="store_true", help=what)
     parser.add_argument("--episodes", type=int, default=256)
     parser.add_argument("--json", type=Path)
-    args = parser.parse_args(arguments)
+    args = parser.parse_args(words)
     try:
         rows = rows_of(args.policy, APART if args.apart else ALIKE, args.episodes)
     except InputError as error:
