@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import jax
+import jaxtyping
 import pytest
 from jaxtyping import config, install_import_hook
 from support import shapes
@@ -18,6 +19,7 @@ fix_rounding()  # as the commands do
 # Before any test imports them: every array is checked against its annotation.
 CHECKER = f"{shapes.__name__}.{shapes.check_arrays.__name__}"
 SHAPED = ["rewards", "envs", "sysid"]
+jaxtyping.jaxtyped = shapes.of_arrays(jaxtyping.jaxtyped)
 install_import_hook(SHAPED, CHECKER)
 
 QUICK_COMPILE = (

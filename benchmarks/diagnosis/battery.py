@@ -17,6 +17,7 @@ import json
 import math
 import multiprocessing
 import os
+import signal
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -175,6 +176,8 @@ def _shown(task: Task, case: Case) -> bool:
 def main() -> None:
     """Runs the battery from the command line."""
     compile_loops_whole()  # as the command does
+    # As Ctrl-C does, whose exception ends the pool's processes, too.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
     parser.add_argument("--seed", type=int, default=None, help="default: drawn")
     parser.add_argument("--wide", action="store_true", help="conditions of their own")

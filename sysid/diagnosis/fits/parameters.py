@@ -12,6 +12,7 @@ import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -72,13 +73,7 @@ class Slot:
         Source:
             Ours.
         """
-        u = np.asarray(u)
-        if self.kind == "linear":
-            return np.asarray(self.scale * u)
-        if self.kind == "log":
-            return np.asarray(self.scale * np.exp(u))
-        with np.errstate(divide="ignore"):
-            return np.asarray(self.scale / np.maximum(u, 0.0))
+        return _value(self.kind, self.scale, np.asarray(u))
 
     def coordinate(self, x: float) -> float:
         """Returns the coordinate of a value."""
@@ -176,22 +171,43 @@ class Space:
         Source:
             Ours.
         """
+        x = np.empty(theta.T.shape, np.float32)
+        for kind, (rows, scales) in self._kinds.items():
+            with np.errstate(over="ignore"):  # no limit is infinite
+                x[rows] = _value(kind, scales, theta.T[rows])
         params: dict[str, dict] = {}
         nuisance = {}
-        for column, slot in zip(theta.T, self.slots, strict=True):
-            with np.errstate(over="ignore"):  # no limit is infinite
-                x = slot.value(column).astype(np.float32)
+        for row, slot in zip(x, self.slots, strict=True):
             if slot.effect:
-                params.setdefault(slot.effect, {})[slot.name] = x
+                params.setdefault(slot.effect, {})[slot.name] = row
             else:
-                nuisance[slot.name] = x
+                nuisance[slot.name] = row
         for name in ("push_gain", "ripple", "k_int"):
             nuisance.setdefault(name, np.ones(len(theta), np.float32))
         return params, Nuisance(**nuisance)
 
+    @cached_property
+    def _kinds(self) -> dict[Kind, tuple[list[int], np.ndarray]]:
+        """Indices of the coordinates of each kind, and a column of their scales."""
+        rows: dict[Kind, list[int]] = {}
+        for i, s in enumerate(self.slots):
+            rows.setdefault(s.kind, []).append(i)
+        scales = np.array([s.scale for s in self.slots])[:, None]
+        return {kind: (found, scales[found]) for kind, found in rows.items()}
+
     def local(self) -> list[int]:
         """Indices of what belongs to a record and not to the mechanism."""
         return [i for i, s in enumerate(self.slots) if s.name in _LOCAL]
+
+
+def _value(kind: Kind, scale: float | np.ndarray, u: np.ndarray) -> np.ndarray:
+    """The parameter x = s u, s eᵘ or s / u; see the module."""
+    if kind == "linear":
+        return np.asarray(scale * u)
+    if kind == "log":
+        return np.asarray(scale * np.exp(u))
+    with np.errstate(divide="ignore"):
+        return np.asarray(scale / np.maximum(u, 0.0))
 
 
 _FREE = 5.0

@@ -1,7 +1,11 @@
 """The battery's own arithmetic, on verdicts that are known."""
 
+import subprocess
+import sys
+import time
 from collections import Counter
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 from typing import cast
 
@@ -209,3 +213,22 @@ def test_a_process_that_has_done_its_records_is_replaced(tmp_path, monkeypatch):
     before = (tmp_path / "rows.jsonl").read_text()
     assert battery.run_all(tasks, 1, tmp_path, "rows.jsonl") == rows
     assert (tmp_path / "rows.jsonl").read_text() == before
+
+
+@pytest.mark.skipif(not Path("/proc").exists(), reason="no list of processes")
+def test_a_terminated_battery_takes_its_processes_with_it(tmp_path):
+    """They went on with their records, for nobody."""
+    words = ["--seed", "5", "--records", "1", "--workers", "1", "--out", str(tmp_path)]
+    command = [sys.executable, "-m", "benchmarks.diagnosis.battery", *words]
+    with subprocess.Popen(command, stderr=subprocess.DEVNULL) as process:
+        own = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        children = []
+        while len(children) < 2:  # the worker, and what tracks resources
+            assert process.poll() is None
+            time.sleep(0.2)
+            children = own.read_text().split()
+        process.terminate()
+    until_s = time.monotonic() + 30.0
+    while any(Path("/proc", child).exists() for child in children):
+        assert time.monotonic() < until_s, children
+        time.sleep(0.2)

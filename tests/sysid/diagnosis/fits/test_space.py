@@ -1,7 +1,8 @@
-"""From where searches begin."""
+"""From where searches begin, and what coordinates are."""
 
 import numpy as np
 import pytest
+from jaxtyping import TypeCheckError
 from support.plain_servo import problem_with
 
 
@@ -64,3 +65,23 @@ def test_no_prior_holds_back_the_size_of_one_effect_more_than_of_another(effect)
     space = problem_with().space
     free = space.prior_sds((effect,))[space.of(effect)]
     assert free == pytest.approx(5.0)
+
+
+def test_values_of_all_coordinates_are_those_of_each():
+    """To the last digit, where they vanish and where they overflow, too."""
+    space = problem_with().space
+    thetas = space.nominal + np.random.default_rng(7).normal(0.0, 1.0, (5, 1))
+    thetas = np.vstack([thetas, np.zeros_like(space.nominal), 100.0 + space.nominal])
+    params, nuisance = space.values(thetas)
+    for slot, column in zip(space.slots, thetas.T, strict=True):
+        known = params[slot.effect] if slot.effect else vars(nuisance)
+        with np.errstate(over="ignore"):
+            expected = slot.value(column).astype(np.float32)
+        assert known[slot.name].tobytes() == expected.tobytes(), slot.label
+
+
+def test_a_candidate_alone_is_refused():
+    """The shapes of methods are checked while the tests run."""
+    space = problem_with().space
+    with pytest.raises(TypeCheckError):
+        space.values(space.nominal)
