@@ -163,7 +163,7 @@ class Space:
         """Values x_i = s_i u_i, s_i e^{u_i} or s_i / u_i of candidates; see `Slot`.
 
         Args:
-            theta: coordinates u of candidates [1].
+            theta: coordinates u of candidates [1], in double precision.
 
         Returns:
             Parameters by effect and name, and nuisance parameters, in their units.
