@@ -11,6 +11,7 @@ from types import SimpleNamespace
 from typing import cast
 
 import pytest
+from support.processes import alive
 
 from benchmarks.diagnosis import battery, plan
 from benchmarks.diagnosis.battery import REACHED, _shown
@@ -237,15 +238,6 @@ def test_a_terminated_battery_takes_its_processes_with_it(tmp_path):
             children = own.read_text().split()
         process.terminate()
     until_s = time.monotonic() + 5.0
-    while any(map(is_running, children)):
+    while any(map(alive, children)):
         assert time.monotonic() < until_s, children
         time.sleep(0.2)
-
-
-def is_running(process):
-    """Whether a process is there, and not only what it has left for its parent."""
-    stat = Path("/proc", process, "stat")
-    try:
-        return stat.read_text().rpartition(")")[2].split()[0] != "Z"
-    except (FileNotFoundError, ProcessLookupError):
-        return False

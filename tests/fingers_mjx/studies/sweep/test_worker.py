@@ -7,6 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
+from support.processes import alive
 from support.sweep_setup import sweep
 
 from envs.errors import InputError
@@ -136,10 +137,3 @@ def test_a_worker_ends_with_the_process_that_started_it():
         time.sleep(0.05)
     os.kill(child, 9)
     raise AssertionError("the worker is still there")
-
-
-def alive(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rsplit(")")[-1].split()[0] != "Z"
-    except OSError:
-        return False
