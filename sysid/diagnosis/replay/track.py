@@ -143,8 +143,9 @@ class _Joint:
         ]
 
     def all_efforts(self) -> list[np.ndarray]:
-        """Torques of all joints [N·m]; zero where not logged."""
-        scale = self.drive.effort_scale.value
+        """Torques of all joints [N·m], each by its own scale; zero where not logged."""
+        drives = [self.mechanism.drives[n] for n in self.logs[0].header.joints]
+        scale = np.array([drive.effort_scale.value for drive in drives])
         return [np.nan_to_num(scale * p.effort) for p in self.pieces]
 
     def slow_speeds(self) -> list[np.ndarray]:
