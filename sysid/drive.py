@@ -16,6 +16,8 @@ UNIVERSAL = ("1", "s", "Hz", "1e-6")
 """Units of parameters whose bounds hold for a robot of any size."""
 _TOLERANCE = {"low": 0.0, "high": 10.0}
 """Range of every tolerance [1]."""
+NEVER_NOMINAL = ("joint_coupling", "finger_weakness")
+"""Effects on joints that no simulation of one joint has: another joint, or a finger."""
 
 
 @dataclass(frozen=True)
@@ -112,12 +114,13 @@ class JointDrive:
     """Drive of one joint as simulated so far.
 
     Attributes:
-        kp: position gain [N·m/rad, or N/m]; with a cascade that of its `gains`.
+        kp: position gain [N·m/rad, or N/m], more than 0 unless `known` is `mechanics`;
+            with a cascade that of its `gains`.
         kd: velocity gain [N·m·s/rad, or N·s/m]; the same.
         kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
             the gain is the same in all records.
         effort: column that holds the effort of the drive.
-        effort_scale: N·m (or N) per unit of that column.
+        effort_scale: N·m (or N) per unit of that column, more than 0.
         effects: effects that the simulation has, with their parameters by name.
         known: `controller` where unknown forces push on the joint, `mechanics` where
             the law of the controller is not known: only that part is examined then.
@@ -138,18 +141,19 @@ class JointDrive:
     def __post_init__(self) -> None:
         self._take_cascade()
         for name, parameters in self.effects.items():
-            known = effect_kind(name).parameters
-            for parameter in parameters:
-                if parameter not in known:
-                    valid = one_of(known, parameter)
-                    raise InputError("drive", f"effects.{name}", parameter, valid)
-                _check_range(name, parameter, parameters[parameter].value)
+            _check_effect(name, parameters)
         for name in ("kp", "kd"):
             if getattr(self, name) is _NOT_GIVEN:
                 valid = "a mapping of value, tolerance, free; or `cascade`"
                 raise InputError("drive", name, "", valid)
             if not getattr(self, name).value >= 0.0:
                 raise InputError("drive", name, getattr(self, name).value, "at least 0")
+        if not self.kp.value and self.known != "mechanics":
+            valid = "more than 0, or `known: mechanics` for a drive without a target"
+            raise InputError("drive", "kp", self.kp.value, valid)
+        if not 0.0 < self.effort_scale.value < math.inf:
+            valid = "more than 0: an effort in the direction of the angle"
+            raise InputError("drive", "effort_scale", self.effort_scale.value, valid)
 
     def _take_cascade(self) -> None:
         """Takes the gains of the cascade; others beside them are refused."""
@@ -168,12 +172,28 @@ class JointDrive:
         return absent if found is None else found.value
 
 
+def _check_effect(effect: str, parameters: dict[str, Nominal]) -> None:
+    """Refuses effects and parameters that a joint cannot have."""
+    kind = effect_kind(effect)
+    if not kind.acts or effect in NEVER_NOMINAL:
+        valid = "effects on one joint: this one is not simulated there"
+        raise InputError("drive", "effects", effect, valid)
+    for name, given in parameters.items():
+        if name not in kind.parameters:
+            valid = one_of(kind.parameters, name)
+            raise InputError("drive", f"effects.{effect}", name, valid)
+        _check_range(effect, name, given.value)
+
+
 def _check_range(effect: str, name: str, value: float) -> None:
     """Refuses what no robot has: bounds that know of sizes hold for the hand alone."""
     parameter = effect_kind(effect).parameters[name]
     low, high = parameter.low, parameter.high
     if parameter.unit not in UNIVERSAL:
         low, high = (0.0 if low >= 0.0 else -np.inf), np.inf
+    if parameter.identity == np.inf and value == 0.0:
+        valid = f"more than 0 {parameter.unit}: nothing would move within this limit"
+        raise InputError("drive", f"effects.{effect}.{name}", value, valid)
     if not (low <= value <= high or value == parameter.identity):
         valid = f"{low:g} to {high:g} {parameter.unit}".replace(" 1", "")
         raise InputError("drive", f"effects.{effect}.{name}", value, valid)

@@ -39,7 +39,7 @@ def describe(
     """
     joints = logs[0].header.joints
     columns = {joint: effort_column(logs, joint) for joint in joints}
-    nothing = Nominal(0.0, 1.0, free=True)
+    nothing = Nominal(1.0, free=True)
     drives = {j: JointDrive(nothing, nothing, effort=columns[j][0]) for j in joints}
     mechanism = model_mechanism(model, drives, source)
     pieces, bodies, _ = measured_pieces(logs, mechanism)

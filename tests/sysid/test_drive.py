@@ -57,6 +57,30 @@ def test_gains_that_push_away_are_refused(gains):
         JointDrive(*map(Nominal, gains))
 
 
+def test_a_drive_without_a_gain_is_one_whose_law_is_not_known():
+    with pytest.raises(InputError, match=r"kp: found 0\.0; valid: more than 0, or"):
+        JointDrive(Nominal(0.0), Nominal(0.1))
+    assert JointDrive(Nominal(0.0), Nominal(0.1), known="mechanics").kp.value == 0.0
+
+
+@pytest.mark.parametrize("scale", [0.0, -0.5, math.nan, math.inf])
+def test_an_effort_against_the_angle_is_refused(scale):
+    with pytest.raises(InputError, match=r"effort_scale: found .* direction"):
+        JointDrive(Nominal(5.0), Nominal(0.1), effort_scale=Nominal(scale))
+
+
+@pytest.mark.parametrize("effect", ["floor_tilt", "joint_coupling", "finger_weakness"])
+def test_effects_that_are_not_of_one_joint_are_refused(effect):
+    with pytest.raises(InputError, match=f"found {effect}; valid: effects on"):
+        JointDrive(Nominal(5.0), Nominal(0.1), effects={effect: {}})
+
+
+def test_a_limit_of_nothing_is_refused():
+    with pytest.raises(InputError, match=r"limit_nm: found 0\.0; valid: more than 0"):
+        with_effect("torque_limit", "limit_nm", 0.0)
+    assert with_effect("torque_limit", "limit_nm", math.inf).effects
+
+
 def read(**joint):
     joint = {"kp": {"value": 5.0}, "kd": {"value": 0.1}, **joint}
     return from_dict(DriveFile, {"schema": 1, "joints": {"knee": joint}}, "drive.yaml")

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.errors import InputError
+from sysid.drive import JointDrive
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 
@@ -20,6 +21,9 @@ UNLIKE = 0.5
 FURTHEST_S = 0.5
 """Rows further apart than this show nothing of a servo, not even its rests [s]."""
 
+EFFORTS = ("tau", "cur", "duty")
+"""Columns of an effort; the first is read where `drive.yaml` names none."""
+
 SHIFTS = 12
 """Lags that are tried: up to about half a second."""
 
@@ -29,14 +33,42 @@ def check_records(logs: Sequence[MeasuredLog], mechanism: Mechanism) -> None:
 
     Raises:
         InputError: angles far outside of a joint's range, as degrees are; times in
-            milliseconds; or an angle that follows the target of another joint.
+            milliseconds; an angle that follows the target of another joint; or a
+            setting or an effort that `drive.yaml` names and a record lacks.
     """
+    for log in logs:
+        for joint in log.header.joints:
+            _check_setting(log, mechanism.drives[joint])
+    for joint in logs[0].header.joints:
+        _check_effort(logs, joint, mechanism.drives[joint])
     for log in logs:
         for joint in log.header.joints:
             _check_rate(log, joint)
             _check_range(log, joint, mechanism)
         if len(log.header.joints) > 1:
             _check_names(log)
+
+
+def _check_setting(log: MeasuredLog, drive: JointDrive) -> None:
+    """Refuses a record without the setting that multiplies a gain."""
+    name, settings = drive.kp_setting, log.header.settings
+    if name and name not in settings:
+        valid = f"{name}, the kp_setting of drive.yaml"
+        raise InputError(log.source, "settings", ", ".join(settings) or "none", valid)
+
+
+def _check_effort(logs: Sequence[MeasuredLog], joint: str, drive: JointDrive) -> None:
+    """Refuses an effort in a column that no record has.
+
+    Without any torque a record is one without effort, since that is what is read if
+    `drive.yaml` says nothing.
+    """
+    there = [e for e in EFFORTS if any(f"{e}.{joint}" in log.columns for log in logs)]
+    asked = drive.effort
+    if asked in ("none", *there) or (asked == EFFORTS[0] and not there):
+        return
+    valid = " or ".join([*(f"effort: {e}" for e in there), "effort: none"])
+    raise InputError(logs[0].source, f"{asked}.{joint}", "no such column", valid)
 
 
 def _check_rate(log: MeasuredLog, joint: str) -> None:

@@ -1,5 +1,7 @@
 """Records that cannot be diagnosed: one sentence, or a verdict that says so."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -40,10 +42,33 @@ def log_of(t_s=T, **columns):
     return make_log(("hip", "knee"), t_s, named, source="arm.csv")
 
 
-def refused(log, match):
+def refused(log, match, mechanism=None):
     with pytest.raises(InputError, match=match) as caught:
-        diagnose([log], arm())
+        diagnose([log], mechanism or arm())
     assert "\n" not in str(caught.value)
+
+
+def driven(**drive):
+    """The arm, with more said of its drives."""
+    arms = arm()
+    drives = {n: replace(d, **drive) for n, d in arms.drives.items()}
+    return replace(arms, drives=drives)
+
+
+def test_an_effort_in_another_column():
+    gone = r"arm\.csv: cur\.hip: found no such column; valid: effort: none"
+    refused(log_of(), gone, driven(effort="cur"))
+    refused(
+        log_of(tau_hip=0.0 * T), r"effort: tau or effort: none", driven(effort="cur")
+    )
+    assert all_tracks(
+        [log_of()], driven(effort="tau")
+    )  # what is read if nothing is said
+
+
+def test_a_setting_that_no_record_has():
+    said = r"arm\.csv: settings: found none; valid: gain, the kp_setting"
+    refused(log_of(), said, driven(kp_setting="gain"))
 
 
 def test_degrees():
