@@ -84,13 +84,18 @@ class Row:
         return {*self.causes[:1], *self.alternatives} if self.causes else set()
 
     @property
+    def everything(self) -> set[str]:
+        """All causes and what cannot be distinguished from one of them."""
+        return {*self.causes, *self.alternatives, *self.others}
+
+    @property
     def has_both(self) -> bool:
         """Whether the effects of a pair are causes, or named beside one.
 
         One cause with its alternatives stands for one effect only.
         """
-        said = {*self.causes, *self.alternatives, *self.others}
-        return set(self.effects) <= said and len(self.causes) >= len(self.effects)
+        enough = len(self.causes) >= len(self.effects)
+        return set(self.effects) <= self.everything and enough
 
     @property
     def right(self) -> bool:
@@ -167,6 +172,8 @@ def statistics(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
     )
     sizes = [len(r.named) for r in visible if r.named]
     result["set size"] = {"mean": _mean(sizes), "n": len(sizes)}
+    every = [len(r.everything) for r in visible if r.named]
+    result["all that is named"] = {"mean": _mean(every), "n": len(every)}
     named = [r for r in single if r.causes]
     result["no second cause"] = _rate(len(r.causes) == 1 for r in named)
     alarms = [r.verdict not in ("none", "not_observable") for r in groups["none"]]
@@ -205,6 +212,7 @@ def statistics(rows: Sequence[Row]) -> dict[str, dict[str, float | int]]:
     result["errors raised"] = _rate(r.verdict == "error" for r in rows)
     times = [r.runtime_s for r in rows]
     result["runtime_s"] = {"median": float(np.median(times)) if times else 0.0}
+    result["within a minute"] = _rate(s <= 60.0 for s in times)
     return result
 
 

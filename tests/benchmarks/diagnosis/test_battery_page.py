@@ -72,3 +72,15 @@ def test_a_loop_that_is_worse_is_missed():
     worse = dataclasses.replace(RIGHT, closed_loop=(1.0, 2.0))
     assert "missed" in line([worse, QUIET], "`found`, and worse")
     assert "met" in line([RIGHT, QUIET], "`found`, and worse")
+
+
+def test_what_no_aim_counts_is_there_too():
+    both = {"group": "double", "effects": ("deadband", "backlash")}
+    half = dataclasses.replace(RIGHT, **both)
+    whole = dataclasses.replace(half, causes=("deadband", "backlash"), runtime_s=90.0)
+    rows = [RIGHT, QUIET, half, whole]
+    assert line(rows, "both of two effects").endswith("1 of 2, 50.0 % |")
+    assert line(rows, "an answer within 60 s").endswith("3 of 4, 75.0 % |")
+    more = dataclasses.replace(RIGHT, causes=("deadband", "armature"))
+    assert line([more, QUIET], "one effect, and no second").endswith("0 of 1, 0.0 % |")
+    assert line([more, QUIET], "all causes and what").endswith("| 2 |")
