@@ -5,7 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from envs.errors import InputError
-from sysid.description.law import friction_sign, joined, regression, rows_of
+from sysid.description.law import (
+    Estimate,
+    enough,
+    friction_sign,
+    joined,
+    regression,
+    rows_of,
+)
 from sysid.description.stretches import Stretch
 from sysid.drive import Effort, Nominal
 from sysid.logs.log import MeasuredLog
@@ -69,12 +76,9 @@ def effort_scale(
         Identification, Springer Handbook of Robotics, 2nd ed., ch. 6.
     """
     rows = rows_of(stretches)
-    effort, vel, need = (
-        joined([getattr(s, name) for s in stretches], rows)
-        for name in ("effort", "vel", "need_nm")
-    )
-    sign = friction_sign(vel, float(np.percentile(np.abs(vel), 98)))
-    found = regression(np.column_stack([effort, -vel, -sign]), need)
+    if not enough(rows):
+        return Nominal(1.0, 0.05, column != "tau"), "too few rows count to show it"
+    found = _balance(stretches, rows)
     scale, sd = float(found.theta[0]), float(found.sd[0])
     certain = found.share > EXPLAINED and sd < CERTAIN * abs(scale)
     if not certain:
@@ -90,3 +94,13 @@ def effort_scale(
         if column == "tau" and abs(scale / size - 1.0) < NEAR:
             return Nominal(size, 0.05), f"{unit}: {measured}"
     return Nominal(float(f"{scale:.4g}"), 0.3), measured
+
+
+def _balance(stretches: Sequence[Stretch], rows: list[np.ndarray]) -> Estimate:
+    """Factors of effort, speed and friction that balance what the motion takes."""
+    effort, vel, need = (
+        joined([getattr(s, name) for s in stretches], rows)
+        for name in ("effort", "vel", "need_nm")
+    )
+    sign = friction_sign(vel, float(np.percentile(np.abs(vel), 98)))
+    return regression(np.column_stack([effort, -vel, -sign]), need)

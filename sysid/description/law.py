@@ -21,6 +21,9 @@ PARTS = 5
 MOST_ROWS = 20_000
 """Rows of which an estimate is made; of longer records every so many-th."""
 
+LEAST_ROWS = 10 * PARTS
+"""Rows below which nothing is estimated."""
+
 MORE = 1.2
 """Paths that leave so much more than the best one are as good [1]."""
 
@@ -108,6 +111,11 @@ def rows_of(stretches: Sequence[Stretch]) -> list[np.ndarray]:
     return [rows[::every] for rows in kept]
 
 
+def enough(rows: Sequence[np.ndarray]) -> bool:
+    """Returns whether so many rows count that an estimate says something."""
+    return sum(map(len, rows)) >= LEAST_ROWS
+
+
 def friction_sign(
     vel: Float[np.ndarray, " n"], largest: float
 ) -> Float[np.ndarray, " n"]:
@@ -139,14 +147,14 @@ def servo_law(
         friction: whether dry friction is in it, with the other sign.
 
     Returns:
-        None where no row counts, or the targets do not move or are the angles.
+        None where too few rows count, or the targets do not move or are the angles.
 
     Source:
         R. Frisch, Statistical Confluence Analysis by Means of Complete Regression
         Systems, 1934 (bounds where both sides have errors).
     """
     rows = rows_of(stretches)
-    if sum(map(len, rows)) < 10 * PARTS:
+    if not enough(rows):
         return None
     if np.ptp(joined([s.command(0.0, np.inf) for s in stretches], rows)) == 0.0:
         return None

@@ -8,7 +8,7 @@ import numpy as np
 
 from envs.errors import InputError
 from sysid.description.effort import effort_scale
-from sysid.description.law import Law, joined, rows_of, servo_law
+from sysid.description.law import Law, enough, joined, rows_of, servo_law
 from sysid.description.stretches import Stretch
 from sysid.description.suggested import suggested_effects
 from sysid.diagnosis.measured.segments import SLOW_S
@@ -83,7 +83,8 @@ def proposal(
         torque = [scale.value * s.effort for s in stretches]
     _check_direction(stretches, source, joint)
     law = servo_law(stretches, torque, friction=column == "none")
-    known, why["known"] = _known(law, column, row_s)
+    counted = enough(rows_of(stretches))
+    known, why["known"] = _known(law, column, row_s, counted)
     gains = _gains(law, column)
     (kp, why["kp"]), (kd, why["kd"]) = gains["kp"], gains["kd"]
     for name, *given in actuators:
@@ -94,7 +95,9 @@ def proposal(
         why["kp_setting"] = "records with another setting have another gain by it"
     drive = JointDrive(kp, kd, setting, column, scale, known=known)
     asked = ("kp", "kd", *["effort_scale"] * (column != "none"), "known")
-    return Proposal(joint, drive, why, suggested_effects(stretches, law), asked)
+    # Rests show neither when a target acted nor how fast the joint went there.
+    suggested = () if row_s > SLOW_S else suggested_effects(stretches, law)
+    return Proposal(joint, drive, why, suggested, asked)
 
 
 def answered(made: Proposal, field: str, text: str) -> Proposal:
@@ -127,6 +130,8 @@ def answered(made: Proposal, field: str, text: str) -> Proposal:
 def _check_direction(stretches: Sequence[Stretch], source: str, joint: str) -> None:
     """Refuses an angle that falls where its target rises."""
     rows = rows_of(stretches)
+    if not enough(rows):
+        return
     target = joined([s.command(0.0, np.inf) for s in stretches], rows)
     angle = joined([s.pos for s in stretches], rows)
     if np.ptp(target) > 0.0 and np.corrcoef(target, angle)[0, 1] < -0.8:
@@ -134,14 +139,19 @@ def _check_direction(stretches: Sequence[Stretch], source: str, joint: str) -> N
         raise InputError(source, f"pos.{joint}", found, "one direction for both")
 
 
-def _known(law: Law | None, column: str, row_s: float) -> tuple[Part, str]:
-    """Which part of the drive the records can examine."""
-    if law is None:
+def _known(
+    law: Law | None, column: str, row_s: float, counted: bool
+) -> tuple[Part, str]:
+    """Which part of the drive the records can examine; `counted`: in enough rows."""
+    if law is None and counted:
         part = "both" if column == "none" else "mechanics"
         return part, "the targets do not move, or are the angles themselves"
     if row_s > SLOW_S:
         part = "both" if column == "none" else "controller"
-        return part, f"rows {1e3 * row_s:.0f} ms apart show rests alone"
+        said = f"rows {1e3 * row_s:.0f} ms apart show rests alone"
+        return part, said if counted else f"{said}, of which there are too few"
+    if law is None:
+        return "both", "too few rows count to say otherwise"
     if column != "none" and law.share < LAW:
         said = f"gains explain {law.share:.0%} of the effort: another law drives;"
         return "mechanics", f"{said} {VELOCITY_LOOP}"

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sysid.description.law import Law, joined, rows_of
+from sysid.description.law import Law, enough, joined, rows_of
 from sysid.description.stretches import Stretch
 
 PLATEAU = 0.1
@@ -47,6 +47,8 @@ def _own_speed(stretches: Sequence[Stretch]) -> float:
     Without a limit the speed of an approach depends on how far the target is.
     """
     rows = rows_of(stretches)
+    if not enough(rows):
+        return 0.0
     speed = joined([np.abs(s.vel) for s in stretches], rows)
     still = joined([_stands(s) for s in stretches], rows)
     fast = speed[still & (speed > 0.5 * np.percentile(speed, 99))]

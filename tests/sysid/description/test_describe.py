@@ -56,6 +56,11 @@ def record(cmd=SINES, gain=1.0, own_speed=np.inf, **columns):
     return make_log(("servo",), T_S, both | named, settings={"gain": gain})
 
 
+def some_rows(log, rows):
+    columns = {name: values[rows] for name, values in log.columns.items()}
+    return make_log(("servo",), log.t_s[rows], columns)
+
+
 def described(*logs, more=""):
     (found,) = describe(logs, model(more))
     return found
@@ -123,6 +128,49 @@ def test_a_joint_that_rests_shows_nothing():
     found = described(record(cmd=np.zeros(len(T_S))))
     assert found.drive.kp.free
     assert found.why["kp"] == "the record does not show it"
+
+
+@pytest.mark.parametrize(
+    ("column", "made"),
+    [
+        ("none", record),
+        ("tau", lambda: record(tau=lambda nm: nm)),
+        ("cur", lambda: record(cur=lambda nm: nm)),
+    ],
+)
+def test_a_joint_that_never_rests_in_rows_of_10_hz(column, made):
+    log = made()
+    for every in (10, 15, 20):
+        found = described(some_rows(log, slice(None, None, every)))
+        assert found.drive.effort == column
+        assert found.drive.kp.free
+        assert found.why["kp"] == "the record does not show it"
+        said = f"rows {10 * every} ms apart show rests alone"
+        assert found.why["known"] == f"{said}, of which there are too few"
+        assert found.suggested == ()
+        if column != "none":
+            assert found.drive.effort_scale.free == (column == "cur")
+            assert found.why["effort_scale"] == "too few rows count to show it"
+
+
+def test_rests_in_rows_of_10_hz_show_the_gain():
+    log = record(cmd=STEPS, own_speed=0.8, tau=lambda nm: nm)
+    found = described(some_rows(log, slice(None, None, 10)))
+    assert found.drive.known == "controller"
+    assert found.drive.kp.value == pytest.approx(KP, rel=0.1)
+
+
+def test_rests_show_no_path_of_the_targets():
+    log = record(cmd=STEPS, own_speed=0.3, tau=lambda nm: nm)
+    assert described(some_rows(log, slice(None, None, 5))).suggested == ()
+
+
+def test_a_record_that_is_too_short_says_nothing():
+    log = record(tau=lambda nm: nm)
+    found = described(some_rows(log, slice(0, 160, 2)))
+    assert found.drive.known == "both"
+    assert found.why["known"] == "too few rows count to say otherwise"
+    assert found.why["effort_scale"] == "too few rows count to show it"
 
 
 def test_a_setting_that_multiplies_the_gain():
