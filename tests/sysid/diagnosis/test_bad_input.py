@@ -9,6 +9,7 @@ from envs.errors import InputError
 from envs.physics.quiet_mujoco import mujoco
 from fingers_mjx.cli.main import main
 from sysid.diagnosis.diagnose import diagnose
+from sysid.diagnosis.measured.checks import check_records
 from sysid.diagnosis.replay.track import all_tracks
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import make_log
@@ -29,8 +30,8 @@ joints: {"*": {kp: {value: 5.0}, kd: {value: 0.1}, effort: none}}
 T = np.arange(800) * 0.005
 
 
-def arm():
-    model = mujoco.MjModel.from_xml_string(ARM)
+def arm(mjcf=ARM):
+    model = mujoco.MjModel.from_xml_string(mjcf)
     drive = JointDrive(Nominal(5.0), Nominal(0.1), effort="none")
     return model_mechanism(model, {"*": drive})
 
@@ -74,6 +75,21 @@ def test_a_setting_that_no_record_has():
 def test_degrees():
     x = 10.0 * np.sin(2.0 * T)
     refused(log_of(cmd_hip=x, pos_hip=x), r"arm\.csv: pos\.hip: found -10 to 10")
+
+
+def test_degrees_of_a_joint_without_range():
+    """What the guide says of them: only what no joint turns by is refused."""
+    free = arm(ARM.replace('range="-1 1" limited="true"', ""))
+    x = 12.5 * np.sin(2.0 * T)
+    check_records([log_of(cmd_hip=x, pos_hip=x)], free)
+    with pytest.raises(InputError, match=r"at most 12\.57 rad"):
+        log_of(cmd_hip=1.01 * x, pos_hip=1.01 * x)
+
+
+def test_milliseconds_of_rows_at_2_khz():
+    """What the guide says of them: they may be seconds."""
+    refused(log_of(0.51 * np.arange(8000.0)), r"t in milliseconds\?")
+    check_records([log_of(0.5 * np.arange(8000.0))], arm())
 
 
 def test_joints_in_another_order():
