@@ -77,7 +77,13 @@ def test_gains_and_unit_of_a_torque():
 
 
 @pytest.mark.parametrize(
-    ("unit", "size"), [("kgf·cm", 0.0980665), ("mN·m", 1e-3), ("ozf·in", 0.00706155)]
+    ("unit", "size"),
+    [
+        ("kgf·cm", 0.0980665),
+        ("N·cm", 0.01),
+        ("ozf·in", 0.00706155),
+        ("mN·m", 1e-3),
+    ],
 )
 def test_other_units_of_a_torque_are_recognized(unit, size):
     found = described(record(tau=lambda nm: nm / size))
