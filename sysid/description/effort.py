@@ -90,9 +90,9 @@ def effort_scale(
         found_here = f"{scale:.3g} N·m per unit by the masses of the MJCF file"
         raise InputError(*where, found_here, "an effort in the direction of the angle")
     measured = f"by the masses of the MJCF file {scale:.4g} ± {sd:.2g}"
-    for unit, size in UNITS.items():
-        if column == "tau" and abs(scale / size - 1.0) < NEAR:
-            return Nominal(size, 0.05), f"{unit}: {measured}"
+    unit, size = min(UNITS.items(), key=lambda known: abs(scale / known[1] - 1.0))
+    if column == "tau" and abs(scale / size - 1.0) < NEAR:
+        return Nominal(size, 0.05), f"{unit}: {measured}"
     return Nominal(float(f"{scale:.4g}"), 0.3), measured
 
 

@@ -92,6 +92,15 @@ def test_other_units_of_a_torque_are_recognized(unit, size):
     assert found.drive.kp.value == pytest.approx(KP, rel=0.1)
 
 
+@pytest.mark.parametrize(("unit", "size"), [("N·cm", 0.01), ("ozf·in", 0.00706155)])
+def test_the_nearest_unit_counts_where_masses_are_off(unit, size):
+    """These two are 1.4 apart: what lies between is of the nearer one."""
+    between = {"N·cm": 1.1, "ozf·in": 0.9}[unit]
+    found = described(record(tau=lambda nm: nm / size * between))
+    assert found.drive.effort_scale.value == size
+    assert found.why["effort_scale"].startswith(unit)
+
+
 def test_a_current_gets_its_torque_constant():
     found = described(record(cur=lambda nm: nm / 0.37))
     assert found.drive.effort == "cur"
