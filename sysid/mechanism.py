@@ -22,7 +22,7 @@ from envs.hand.nominal import NominalHand
 from envs.hand.places import places
 from envs.physics.quiet_mujoco import mujoco
 from sysid.drive import DriveFile, JointDrive, Nominal
-from sysid.passive import with_passive
+from sysid.mjcf.passive import with_passive
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,13 +79,13 @@ def model_mechanism(
 ) -> Mechanism:
     """Makes a mechanism of a compiled model and drives by joint name or `*`.
 
+    A joint without a name, as of a free root, stands where it is.
+
     Raises:
         InputError: a drive of a joint that is not in the model, or no joint at all; or
-            something that is not simulated, see `sysid.passive`.
+            something that is not simulated, see `sysid.mjcf`.
     """
-    simple = (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE)
-    names = [model.joint(i).name for i in range(model.njnt)]
-    movable = [n for n in names if model.joint(n).type[0] in list(map(int, simple))]
+    movable = _movable(model, source)
     for name in drives:
         if name != "*" and name not in movable:
             raise InputError(source, "joints", name, one_of(movable, name))
@@ -98,6 +98,18 @@ def model_mechanism(
     if not kept:
         raise InputError(source, "joints", ", ".join(drives), "a drive for a joint")
     return Mechanism(model, kept)
+
+
+def _movable(model: Any, source: object) -> list[str]:
+    """Names of its hinges and slides; no log can name one that has none."""
+    simple = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
+    # By number: MuJoCo does not find joints without a name by their name.
+    joints = [model.joint(i) for i in range(model.njnt)]
+    names = [j.name for j in joints if j.name and j.type[0] in simple]
+    if not names:
+        found = f"{model.njnt} joints, none of them a hinge or slide with a name"
+        raise InputError(source, "joints", found, "a hinge or slide with a name")
+    return names
 
 
 def hand_mechanism(hand: HandFile | None = None) -> Mechanism:

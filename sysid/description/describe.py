@@ -20,7 +20,7 @@ from sysid.diagnosis.replay.track import measured_pieces
 from sysid.drive import JointDrive, Nominal
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import model_mechanism
-from sysid.passive import actuator_gains
+from sysid.mjcf.actuators import actuator_gains
 
 
 def describe(

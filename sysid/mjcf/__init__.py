@@ -1,0 +1,1 @@
+"""What an MJCF file says of joints beside masses: taken over, or refused by name."""
