@@ -44,9 +44,10 @@ documented cause, those in which no effect at all has more than half of the prob
 ## Looked at once, at the end
 
 {second}
-Asked for is 75 %. The verdicts are those of the first look (two busy cores); the
-probabilities, too, although how they are formed was changed for what the TX40 showed
-([diagnosis](diagnosis.md)). The loaders were written without a diagnosis, checked by
+Asked for is 75 %. Verdicts and probabilities are those of the first look (two busy
+cores). How probabilities are formed was changed afterwards, for what the TX40 showed,
+and much else for other reasons: [the same records again](gallery_again.md), with later
+code. The loaders were written without a diagnosis, checked by
 regressing the measured effort on the nominal mechanism alone. That changed two rows
 before the look: the KR300's wrist moves its load, so that all six axes are in, and its
 authors' friction is mostly Coulomb and viscous (350 to 540 N·m, of which 4 to 18 depend
@@ -159,9 +160,9 @@ def _line(record: Record, row: dict) -> str:
         record.robot,
         record.documented,
         f"{f'**{said}**' if said == RIGHT else said}: `{row['verdict']}`",
-        "; ".join([*_named(documented, sizes=True), *alike]) or "–",
+        "; ".join([*named_effects(documented, sizes=True), *alike]) or "–",
         _likelier(row, documented or (row["causes"] if alike else [])),
-        "; ".join(_named(others, sizes=False)) or "–",
+        "; ".join(named_effects(others, sizes=False)) or "–",
     )
     return f"| {' | '.join(cells)} |"
 
@@ -174,8 +175,13 @@ def _split(record: Record, row: dict) -> tuple[list[dict], list[dict]]:
     return kinds
 
 
-def _named(causes: Sequence[dict], sizes: bool) -> list[str]:
-    """Each effect with its joints, or how often it is named if more than once."""
+def named_effects(causes: Sequence[dict], sizes: bool) -> list[str]:
+    """Returns each effect with its joints, or how often it is named.
+
+    Args:
+        causes: of one row.
+        sizes: whether that of an effect that is named once stands beside it.
+    """
     by_name: dict[str, list[dict]] = {}
     for cause in causes:
         by_name.setdefault(cause["effect"], []).append(cause)
