@@ -114,8 +114,8 @@ class JointDrive:
     """Drive of one joint as simulated so far.
 
     Attributes:
-        kp: position gain [N·m/rad, or N/m], more than 0 unless `known` is `mechanics`;
-            with a cascade that of its `gains`.
+        kp: position gain [N·m/rad, or N/m], more than 0; with a cascade that of its
+            `gains`.
         kd: velocity gain [N·m·s/rad, or N·s/m]; the same.
         kp_setting: name of a setting in the logs' headers that multiplies `kp`; "" if
             the gain is the same in all records.
@@ -148,8 +148,8 @@ class JointDrive:
                 raise InputError("drive", name, "", valid)
             if not getattr(self, name).value >= 0.0:
                 raise InputError("drive", name, getattr(self, name).value, "at least 0")
-        if not self.kp.value and self.known != "mechanics":
-            valid = "more than 0, or `known: mechanics` for a drive without a target"
+        if not self.kp.value:
+            valid = "more than 0; any, where `known: mechanics` leaves it unexamined"
             raise InputError("drive", "kp", self.kp.value, valid)
         if not 0.0 < self.effort_scale.value < math.inf:
             valid = "more than 0: an effort in the direction of the angle"

@@ -135,6 +135,8 @@ def _beside(rows: Sequence[Row]) -> Iterator[str]:
 
 
 BESIDE = (
+    ("right cause first, none that moves alike, medium", "first medium"),
+    ("the same, strong", "first strong"),
     ("both of two effects are causes", "both of two"),
     ("the same, or one stands beside such a cause", "both of two, in the named sets"),
     ("one effect, and no second cause", "no second cause"),
