@@ -11,6 +11,8 @@ from envs.errors import InputError, one_of
 
 SCHEMA = 1
 Effort = Literal["tau", "cur", "duty", "none"]
+EFFORTS: tuple[Effort, ...] = ("tau", "cur", "duty")
+"""Columns of an effort, best first; that one is read where `drive.yaml` names none."""
 Part = Literal["both", "controller", "mechanics"]
 UNIVERSAL = ("1", "s", "Hz", "1e-6")
 """Units of parameters whose bounds hold for a robot of any size."""

@@ -3,7 +3,7 @@
 PYTHONPATH=.:tests:deploy python -m benchmarks.diagnosis.battery_page
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 from benchmarks.diagnosis.calibration import (
@@ -109,10 +109,9 @@ def _aims(rows: Sequence[Row], error: float) -> Iterator[str]:
         ("size in its 95 % interval ≥ 90 %", "coverage", 0.9, 1),
     )
     for text, name, bar, sign in asked:
-        if number := int(found[name]["n"]):
-            rate = found[name]["rate"]
-            share = f"{round(rate * number)} of {number}, {100 * rate:.1f} %"
-            yield f"| {text} | {share} | {_met(sign * rate >= sign * bar)} |"
+        if found[name]["n"]:
+            met = _met(sign * found[name]["rate"] >= sign * bar)
+            yield f"| {text} | {_share(found[name])} | {met} |"
     for text, name, key, bar, unit in MEANS:
         value = found[name][key]
         yield f"| {text} | {value:.3g}{unit} | {_met(value <= bar)} |"
@@ -127,9 +126,8 @@ def _beside(rows: Sequence[Row]) -> Iterator[str]:
     """What was measured beside the aims."""
     found = statistics(rows)
     for text, name in BESIDE:
-        if number := int(found[name]["n"]):
-            rate = found[name]["rate"]
-            yield f"| {text} | {round(rate * number)} of {number}, {100 * rate:.1f} % |"
+        if found[name]["n"]:
+            yield f"| {text} | {_share(found[name])} |"
     mean = found["all that is named"]["mean"]
     yield f"| all causes and what is not distinguished from them, mean | {mean:.3g} |"
 
@@ -150,6 +148,12 @@ MEANS = (
     ("median error of a size ≤ 0.05", "size error", "median", 0.05, ""),
     ("median time of one core ≤ 60 s", "runtime_s", "median", 60.0, " s"),
 )
+
+
+def _share(found: Mapping[str, float]) -> str:
+    """How many of how many."""
+    rate, number = found["rate"], int(found["n"])
+    return f"{round(rate * number)} of {number}, {100 * rate:.1f} %"
 
 
 def _met(met: bool) -> str:

@@ -14,7 +14,7 @@ from sysid.description.law import (
     rows_of,
 )
 from sysid.description.stretches import Stretch
-from sysid.drive import Effort, Nominal
+from sysid.drive import EFFORTS, Effort, Nominal
 from sysid.logs.log import MeasuredLog
 
 UNITS: Mapping[str, float] = {
@@ -43,7 +43,7 @@ def effort_column(logs: Sequence[MeasuredLog], joint: str) -> tuple[Effort, str]
     no use.
     """
     unsigned = []
-    for quantity in ("tau", "cur", "duty"):
+    for quantity in EFFORTS:
         name = f"{quantity}.{joint}"
         if all(name in log.columns for log in logs):
             values = np.concatenate([log.samples(name)[1] for log in logs])

@@ -13,6 +13,7 @@ from benchmarks.diagnosis.gallery.overview import (
     RIGHT,
     WRONG,
     named_effects,
+    not_distinguished,
     rating,
 )
 from benchmarks.diagnosis.gallery.page import read_rows
@@ -90,8 +91,8 @@ def _line(before: dict, now: dict) -> str:
 
 def _said(row: dict) -> str:
     """Verdict, causes with their joints, and what is not distinguished from them."""
-    alike = [f"`{effect}`, not distinguished" for effect in row["alike"]]
-    causes = "; ".join([*named_effects(row["causes"], sizes=False), *alike])
+    named = named_effects(row["causes"], sizes=False)
+    causes = "; ".join([*named, *not_distinguished(row["alike"])])
     return f"`{row['verdict']}` {causes}".strip()
 
 

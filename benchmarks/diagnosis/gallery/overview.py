@@ -5,7 +5,7 @@ off the rows, robots and documented causes off the records.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from benchmarks.diagnosis.gallery.record import Record
 
@@ -153,7 +153,7 @@ def _table(own: Sequence[tuple[Record, dict]]) -> str:
 
 def _line(record: Record, row: dict) -> str:
     documented, others = _split(record, row)
-    alike = [f"`{e}`, not distinguished" for e in row["alike"] if e in record.effects]
+    alike = not_distinguished(e for e in row["alike"] if e in record.effects)
     said = rating(row)
     cells = (
         f"[`{record.name}`](gallery/{record.name}.md)",
@@ -173,6 +173,15 @@ def _split(record: Record, row: dict) -> tuple[list[dict], list[dict]]:
     for cause in row["causes"]:
         kinds[cause["effect"] not in record.effects].append(cause)
     return kinds
+
+
+def not_distinguished(effects: Iterable[str]) -> list[str]:
+    """Returns how effects are named that records do not separate from a cause.
+
+    Args:
+        effects: their names.
+    """
+    return [f"`{effect}`, not distinguished" for effect in effects]
 
 
 def named_effects(causes: Sequence[dict], sizes: bool) -> list[str]:

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from envs.errors import InputError
-from sysid.drive import JointDrive
+from sysid.drive import EFFORTS, JointDrive
 from sysid.logs.log import MeasuredLog
 from sysid.mechanism import Mechanism
 
@@ -20,9 +20,6 @@ UNLIKE = 0.5
 
 FURTHEST_S = 0.5
 """Rows further apart than this show nothing of a servo, not even its rests [s]."""
-
-EFFORTS = ("tau", "cur", "duty")
-"""Columns of an effort; the first is read where `drive.yaml` names none."""
 
 SHIFTS = 12
 """Lags that are tried: up to about half a second."""

@@ -59,12 +59,12 @@ def driven(**drive):
 def test_an_effort_in_another_column():
     gone = r"arm\.csv: cur\.hip: found no such column; valid: effort: none"
     refused(log_of(), gone, driven(effort="cur"))
-    refused(
-        log_of(tau_hip=0.0 * T), r"effort: tau or effort: none", driven(effort="cur")
-    )
-    assert all_tracks(
-        [log_of()], driven(effort="tau")
-    )  # what is read if nothing is said
+    torque = log_of(tau_hip=0.0 * T)
+    refused(torque, r"effort: tau or effort: none", driven(effort="cur"))
+
+
+def test_a_torque_need_not_be_there_if_nothing_is_said():
+    assert all_tracks([log_of()], driven(effort="tau"))
 
 
 def test_a_setting_that_no_record_has():
